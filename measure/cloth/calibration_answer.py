@@ -219,12 +219,12 @@ def table_of_quantities(heading: str, quantities: Mapping[str, Quantity]) -> Tab
 
 
 def _recording_section(recording: Fitted, calibration: Calibration) -> Section:
-    share = f"{recording.misfit:.2g}"
+    share = f"{100 * recording.misfit:.2g} %"
     return Section(
         title=f"{recording.observed.name}: {recording.windows} windows against the wind",
         parts=[
             (
-                f"Of simulated flags of this cloth a share of {share} look as unusual as this one. The "
+                f"Of simulated flags of this cloth {share} look as unusual as this one, or more so. The "
                 f"wind was {recording.wind_speed:.1f} m/s in the mean."
             ),
             Figure(

@@ -286,7 +286,7 @@ def _drapes_section(found: Draped) -> Section:
                 ],
             ),
             (
-                f"Of simulated drapes of this cloth a share of {found.fit.tail:.2g} look as unusual. "
+                f"Of simulated drapes of this cloth {100 * found.fit.tail:.2g} % look as unusual, or more so. "
                 f"The answer rests on {found.fit.effective:.0f} independent draws."
             ),
         ],
