@@ -90,12 +90,14 @@ def _expired_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> li
 
 
 def _collected_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
-    """Notes where gc has deleted what was withdrawn, so that older versions show rows without
-    data."""
+    """Notes where data were erased, or gc has deleted what was withdrawn, so that older versions
+    show rows without data."""
     try:
         gone = lake.catalog.objects() - _needed_objects(marked) - frozenset(stored)
         removed = removals(lake.catalog.history())
         gone -= {name for removal in removed for name in removal.expired[1]}
+        erased = {name: why for name, why in erased_objects(lake).items() if name in gone}
+        gone -= erased.keys()
         last = (
             next((r for r in removed if not gone.isdisjoint(rows_left(lake, r).values())), None)
             if gone
@@ -112,9 +114,24 @@ def _collected_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> 
                 fix=error.fix,
             )
         ]
+    findings = []
+    if erased:
+        version, message = max(erased.values())
+        findings.append(
+            Finding.of(
+                "erased",
+                f"{len(erased)} of the objects that older versions show were erased, the last by "
+                f"version {version} ({message})",
+                where=f"versions before {version}",
+                count=len(erased),
+                fix=f"none needed; all tags, and versions from {version} on, are whole without "
+                "them",
+            )
+        )
     if last is None:
-        return []
+        return findings
     return [
+        *findings,
         Finding.of(
             "withdrawn-collected",
             f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; "
@@ -124,7 +141,7 @@ def _collected_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> 
             count=len(gone),
             fix=f"none needed; all tags, and versions from {last.version} on, are whole without "
             "them",
-        )
+        ),
     ]
 
 

@@ -61,6 +61,25 @@ def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike
     assert [note.kind for note in doctor(lake)] == ["withdrawn-collected"]
 
 
+def test_what_was_erased_and_what_gc_took_are_told_apart_where_older_versions_show_both(
+    lake: Lake,
+) -> None:
+    film, other = put_text(lake, "film"), put_text(lake, "other")
+    lake.erase([film.id], "asked to be erased")
+    (erased,) = doctor(lake)
+    assert (erased.kind, erased.count) == ("erased", 1)
+    assert "were erased, the last by version 3 (asked to be erased)" in erased.what
+    assert "gc" not in erased.what
+    lake.withdraw([other.id], "blurred")
+    collect(lake, grace=timedelta(0))
+    _, collected = notes = doctor(lake)
+    assert [(note.kind, note.count) for note in notes] == [
+        ("erased", 1),
+        ("withdrawn-collected", 1),
+    ]
+    assert "withdrawn by version 4 (blurred)" in collected.what
+
+
 def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake) -> None:
     film = put_text(lake, "film")
     made = put_text(lake, "made", parents=(film.id,))

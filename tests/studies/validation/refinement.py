@@ -33,8 +33,8 @@ from flagdata.core.console import progress
 from flagdata.core.rng import child_seed, stream
 from flagdata.dataset import Source
 from measure.refine import (
-    DENSITY,
-    WIND,
+    AREA_WEIGHT_COLUMN,
+    WIND_COLUMN,
     DrawnView,
     Evaluator,
     Refinement,
@@ -324,7 +324,7 @@ def _of_own(target: Target, found: Refinement) -> Score:
     wind, density = (entry.span for entry in found.intervals[:2])
     truth = target.truth["wind_speed"], target.truth["area_weight"]
     values = found.evaluators[0].simulator.space.values(found.posterior.points)
-    middle = np.median(found.posterior.winds[:, 0]), np.median(values[:, DENSITY])
+    middle = np.median(found.posterior.winds[:, 0]), np.median(values[:, AREA_WEIGHT_COLUMN])
     return Score(
         method=_OWN,
         wind_error=float(abs(middle[0] - truth[0])),
@@ -351,8 +351,8 @@ def _of_trace(
     count = len(trace) if seconds is None else max(1, int((trace.seconds <= seconds).sum()))
     return Score(
         method=method,
-        wind_error=abs(value[WIND] - target.truth["wind_speed"]),
-        density_error=abs(value[DENSITY] - target.truth["area_weight"]),
+        wind_error=abs(value[WIND_COLUMN] - target.truth["wind_speed"]),
+        density_error=abs(value[AREA_WEIGHT_COLUMN] - target.truth["area_weight"]),
         wind_inside=None,
         density_inside=None,
         evaluations=count,
