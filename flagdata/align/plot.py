@@ -16,7 +16,6 @@ from flagdata.align.session_chart import HEIGHTS, break_at_gaps, session_panels
 from flagdata.answer.charts import Across, Axis, Chart, Colour, Dots, Line, Mark, Panel, Shade
 from flagdata.core.clock_model import NINETY
 from flagdata.core.files.outputs import check_file, write_file
-from flagdata.pages import chart_drawing
 from flagdata.record.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -31,7 +30,9 @@ def check(path: Path) -> None:
         InputError: a suffix of no format that is drawn, or no folder to write into.
         ConflictError: another file is there.
     """
-    chart_drawing.check_format(path)
+    from flagdata.pages.chart_drawing import check_format
+
+    check_format(path)
     check_file(path, command=_COMMAND)
 
 
@@ -42,8 +43,10 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
         InputError, ConflictError: as `check`.
         FlagdataError: the disk refuses it.
     """
+    from flagdata.pages.chart_drawing import encode
+
     check(path)
-    write_file(path, chart_drawing.encode(chart(evidence, title=title), path), command=_COMMAND)
+    write_file(path, encode(chart(evidence, title=title), path), command=_COMMAND)
 
 
 def chart(evidence: Evidence, *, title: str) -> Chart:
