@@ -76,7 +76,7 @@ def errors_chart(comparisons: Sequence[Comparison], *, after: str) -> Chart | No
         bars([one.before for one in drawn], "base model", Colour.LOG, -0.19),
         bars([one.after for one in drawn], after, Colour.FILM, 0.19),
     ]
-    longest = max(max(mark.lengths) for mark in marks if isinstance(mark, Bars))
+    longest = max(max([*mark.lengths, *mark.high]) for mark in marks if isinstance(mark, Bars))
     x = Axis(label="error on unseen data [% of the base model's]", limits=(0, 1.2 * longest))
     height = 1.3 + 0.62 * len(drawn)
     return Chart(rows=[[Panel(marks=marks, x=x)]], height=height, width=NARROW)

@@ -41,6 +41,15 @@ def test_bars_of_errors_are_in_per_cent_of_the_base_models_and_the_floor_is_behi
     assert errors_chart(verdict(Conclusion.SUFFICIENT).comparisons, after="") is None
 
 
+def test_an_interval_longer_than_its_bar_has_room_and_a_figure_behind_it() -> None:
+    first = verdict(Conclusion.EFFECT).comparisons[0]
+    wide = replace(first, before=replace(first.before, high=2 * first.before.value))
+    chart = errors_chart([wide], after="with lift")
+    assert chart is not None
+    assert chart.rows[0][0].x.limits == (0, pytest.approx(240))
+    assert "100 %" in svg(chart, name="a")
+
+
 def test_a_bar_far_beyond_is_cut_and_its_figure_is_not() -> None:
     first = verdict(Conclusion.EFFECT).comparisons[0]
     worse = replace(first, after=replace(first.after, value=9 * first.before.value, high=math.inf))
