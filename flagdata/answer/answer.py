@@ -14,12 +14,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from numpy.typing import NDArray
+
 from flagdata.answer.charts import Chart
 from flagdata.answer.quantity import Quantity
 from flagdata.core.findings import Finding
 from flagdata.core.parts import attribute
+from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
+    import xarray as xr
     from markupsafe import Markup
 
 Cell: TypeAlias = "str | Markup | Quantity | Sequence[str] | None"
@@ -109,14 +113,33 @@ class Head:
     Attributes:
         figures: the film, and the wind of film and log; at most two.
         facts: what there is to know of it: date, place, clock, size, sensor, in this order.
-        limits: what limits the answer, in sentences.
+        limits: what limits the answer: findings, or sentences.
         remarks: further paragraphs below the sentence.
     """
 
     figures: Sequence[Figure] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
-    limits: Sequence[str] = ()
+    limits: Sequence[str | Finding] = ()
     remarks: Sequence[str | Markup] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Array:
+    """Numbers of an answer, one for each window, draw, marker or recording.
+
+    Attributes:
+        dimensions: name of each axis of `values`.
+        values: SI.
+        unit: of them; "1" of a ratio.
+        about: what they are, in words.
+        coordinate: whether they say where the others are, as times do.
+    """
+
+    dimensions: tuple[str, ...]
+    values: NDArray[Any]
+    unit: str = "1"
+    about: str = ""
+    coordinate: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -129,6 +152,7 @@ class Answer:
         sentence: the answer in one sentence.
         tone: whether it is settled.
         quantities: name → quantity.
+        arrays: name → array, what `to_xarray` returns.
         findings: what a reader has to know.
         document: everything as JSON values, as the verb writes it with --json.
         head: the first screen of its page.
@@ -141,6 +165,7 @@ class Answer:
     sentence: str
     tone: Tone = Tone.SETTLED
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    arrays: Mapping[str, Array] = field(default_factory=dict)
     findings: Sequence[Finding] = ()
     document: Mapping[str, Any] = field(default_factory=dict)
     head: Head = field(default_factory=Head)
@@ -163,6 +188,32 @@ class Answer:
 
         write_file(Path(path), self.page, command=self.question)
         return Path(path)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return its arrays as a data set, with units and meanings as attributes.
+
+        Raises:
+            UsageError: it has none.
+            MissingExtraError: xarray is not installed.
+        """
+        if not self.arrays:
+            raise UsageError(
+                "the answer has no arrays", where=self.subject, fix="take its `quantities`"
+            )
+        from flagdata.core.extras import explaining_missing
+
+        with explaining_missing():
+            import xarray as xr
+
+        variables = {
+            name: xr.Variable(
+                one.dimensions, one.values, {"units": one.unit, "long_name": one.about}
+            )
+            for name, one in self.arrays.items()
+        }
+        coordinates = {name for name, one in self.arrays.items() if one.coordinate}
+        about = {"question": self.question, "subject": self.subject, "answer": self.sentence}
+        return xr.Dataset(variables, attrs=about).set_coords(coordinates)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.sentence})"

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -38,9 +38,22 @@ class WindComparison:
         level: of the interval.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "stated=statement",
+        "difference",
+        "level",
+        "agrees",
+        "sentence",
+    )
+
     stated: Stated
     difference: tuple[float, float] | None
     level: float
+
+    @property
+    def statement(self) -> Any:
+        """The wind from elsewhere as a JSON value."""
+        return self.stated.recipe()
 
     @property
     def agrees(self) -> bool | None:
@@ -71,16 +84,6 @@ class WindComparison:
             "above the ground it is "
             f"about {in_open:.1f} of that in the open, {in_suburb:.1f} among houses"
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "stated": self.stated.recipe(),
-            "difference": self.difference,
-            "level": self.level,
-            "agrees": self.agrees,
-            "sentence": self.sentence,
-        }
 
 
 def compare_winds(

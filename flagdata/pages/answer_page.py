@@ -9,6 +9,7 @@ from markupsafe import Markup, escape
 
 from flagdata.answer.answer import Answer, Figure, Gallery, Part, Section, Table
 from flagdata.answer.charts import Chart
+from flagdata.core.findings import Finding
 from flagdata.core.provenance import code_version
 from flagdata.pages.render import render
 
@@ -17,11 +18,10 @@ def render_answer(answer: Answer) -> str:
     """Renders the page, HTML."""
     provenance = {**answer.provenance, "code": code_version()}
     sections = list(answer.make_sections())
-    if answer.findings:
-        title = f"What was noticed: {len(answer.findings)}"
-        sections.append(
-            Section(title=title, parts=[answer.findings], anchor="findings", folded=True)
-        )
+    limits = [one.what if isinstance(one, Finding) else one for one in answer.head.limits]
+    if further := [one for one in answer.findings if one.what not in limits]:
+        title = f"What {'else ' if limits else ''}was noticed: {len(further)}"
+        sections.append(Section(title=title, parts=[further], anchor="findings", folded=True))
     where = Section(
         title="Where it is from",
         parts=[Table.of_values(provenance)],
@@ -33,10 +33,17 @@ def render_answer(answer: Answer) -> str:
         "answer": answer,
         "facts": Table.of_values(answer.head.facts),
         "sections": [*sections, where],
+        "limits": [_sentences(one) for one in answer.head.limits],
         "kind_of": _kind_of,
         "draw": lambda figure: _draw(figure, f"figure-{next(numbers)}"),
     }
     return render("flagdata.pages", "answer.html.j2", values)
+
+
+def _sentences(limit: str | Finding) -> str:
+    """Makes sentences of what limits an answer, and of what to do about it."""
+    said = [limit] if isinstance(limit, str) else [limit.what, limit.fix or ""]
+    return " ".join(f"{one[0].upper()}{one[1:].rstrip('.')}." for one in said if one)
 
 
 def _kind_of(part: Part) -> str:

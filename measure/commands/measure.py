@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -22,6 +23,7 @@ from flagdata.core.console import (
     say_finding,
 )
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import SHORT
 from flagdata.errors import RefusedError, UsageError
 from flagdata.examples import check_without_lake
@@ -29,13 +31,14 @@ from flagdata.verbs.shared_options import FILM, HOW, WRITTEN, Keeping
 from flagdata.verbs.verb_options import AsJson, argument, command, option, options
 
 if TYPE_CHECKING:
-    from flagdata.answer.wind_elsewhere import WindComparison
+    from flagdata.answer.measured import Measured
     from flagdata.lake import Lake
     from measure.anemometer.networks import Network
     from measure.commands.measure_film import Request
-    from measure.estimate.film_measuring import Measurement, Options
+    from measure.estimate.film_measuring import Measurement
+    from measure.estimate.nearest import Neighbour
     from measure.estimate.wind_by_window import Beside
-    from measure.film.film_source import FilmReading, Subject
+    from measure.film.film_source import Subject
     from measure.refine.refinement import Refinement
 
 
@@ -150,7 +153,7 @@ def measure(chosen: MeasureCommand) -> None:
     done = job.do(clips[0])
     job.refuse(done)
     if chosen.as_json:
-        document("measure", done.as_dict(anyway=chosen.anyway))
+        document("measure", done.answer.document)
     elif chosen.as_csv:
         csv_rows(done.series.rows())
     else:
@@ -161,25 +164,9 @@ def measure(chosen: MeasureCommand) -> None:
 class _Done:
     measured: Measurement
     series: Beside
-    artifact: str | None
     subject: Subject
     refinement: Refinement | None
-    elsewhere: WindComparison | None
-
-    def as_dict(self, *, anyway: bool) -> dict[str, Any]:
-        reported = self.measured.shown(anyway=anyway)
-        truths = self.subject.known or {}
-        return {
-            **self.measured.as_dict(anyway=anyway),
-            "series": self.series.as_dict() if reported else None,
-            "source": None if self.subject.artifact is None else self.subject.artifact.id,
-            "artifact": self.artifact,
-            "refinement": None if self.refinement is None else self.refinement.as_dict(),
-            "wind_elsewhere": None if self.elsewhere is None else self.elsewhere.as_dict(),
-            "conditioning": self.subject.film.as_dict(),
-            "simulated_with": {name: truths[name] for name in self.measured.names if name in truths}
-            or None,
-        }
+    answer: Measured
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,7 +183,7 @@ class _Job:
         """Measure one film; commit and write what is to be shown."""
         from flagdata.core.files.outputs import fresh_folder, write_file
         from flagdata.lake.results import place_result
-        from measure.commands.measure_film import run, wind_elsewhere
+        from measure.commands.measure_film import answer_of, run
         from measure.commands.measurement_artifact import artifact as artifact_of
         from measure.commands.measurement_artifact import keep, write
         from measure.estimate.wind_by_window import beside
@@ -224,16 +211,24 @@ class _Job:
                 cache=self.chosen.cache,
             )
             _warn(refinement.findings)
-        refinement_values = None if refinement is None else refinement.as_dict()
+        refinement_values = json_values(refinement)
         lake = None if self.chosen.read_only or not reported else self.lake
         artifact = None
         if lake is not None:
             row = artifact_of(measured, subject, self.network, self.request.reading)
             artifact = place_result(lake, row, branch=self.chosen.branch).artifact.id
-        elsewhere = wind_elsewhere(measured, self.chosen)
-        text = None
-        if self.chosen.report is not None:
-            text = self._page(measured, series, subject, artifact, refinement, elsewhere)
+        answer = answer_of(
+            measured,
+            subject,
+            self.network,
+            self.request,
+            self.chosen,
+            lake=self.lake,
+            refinement=refinement,
+            artifact=artifact,
+            neighbours=None if self.lake is None else partial(self._nearest, measured, subject),
+        )
+        text = None if self.chosen.report is None else answer.page
         published = False
         if lake is not None and artifact is not None:
             placed_row = keep(
@@ -266,10 +261,9 @@ class _Job:
         return _Done(
             measured=measured,
             series=series,
-            artifact=artifact,
             subject=subject,
             refinement=refinement,
-            elsewhere=elsewhere,
+            answer=answer,
         )
 
     def refuse(self, done: _Done) -> None:
@@ -290,76 +284,22 @@ class _Job:
                 fix=verdict.reasons[0].fix,
             )
 
-    def _page(
-        self,
-        measured: Measurement,
-        series: Beside,
-        subject: Subject,
-        artifact: str | None,
-        refinement: Refinement | None,
-        elsewhere: WindComparison | None,
-    ) -> str:
-        """Renders the page of a report.
-
-        Args:
-            artifact: id of the measurement in the lake; None where it is not to be there.
-        """
-        from measure.estimate.measurement_page import Context, Section, page
-        from measure.estimate.measurement_pictures import steps
+    def _nearest(self, measured: Measurement, subject: Subject) -> tuple[Sequence[Neighbour], int]:
+        """Seeks the simulated clips of the lake nearest to a film, among so many."""
         from measure.estimate.nearest import nearest
-        from measure.refine.refinement_section import section
 
-        model = self.network.estimator
-        neighbours, compared = (), 0
-        if self.lake is not None:
-            with _advancing(("simulated clips", "clip")) as (advance,):
-                neighbours, compared = nearest(
-                    self.lake,
-                    model,
-                    measured.summary,
-                    without=subject.recording,
-                    at=self.at,
-                    seed=self.request.options.seed,
-                    advance=advance,
-                )
-        context = Context(
-            provenance=self._provenance(subject, artifact),
-            known=subject.known or {},
-            neighbours=neighbours,
-            compared=compared,
-            rate=model.front_end.rate,
-            steps=steps(subject.film),
-            figures=subject.film.sentences,
-            elsewhere=elsewhere,
-        )
-        sections = ()
-        if refinement is not None:
-            sections = (
-                Section(
-                    anchor="refinement", title="Refined by simulation", body=section(refinement)
-                ),
+        if self.lake is None:
+            return (), 0
+        with _advancing(("simulated clips", "clip")) as (advance,):
+            return nearest(
+                self.lake,
+                self.network.estimator,
+                measured.summary,
+                without=subject.recording,
+                at=self.at,
+                seed=self.request.options.seed,
+                advance=advance,
             )
-        return page(measured, series, context, anyway=self.chosen.anyway, sections=sections)
-
-    def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
-        film = subject.film
-        source = subject.content_hash() if subject.artifact is None else subject.artifact.id
-        rows = {
-            "film": f"{film.name}, {film.duration:.2f} s at {film.rate:.4g} frames a second",
-            "source": f"SHA-256 {source}"
-            if subject.artifact is None
-            else f"{subject.artifact.kind} {source}",
-            "network": self.network.described,
-            "options": ", ".join(
-                f"{k} {v}" for k, v in _given(self.request.options, self.request.reading).items()
-            ),
-            "seed": str(self.request.options.seed),
-        }
-        return rows if artifact is None else {**rows, "artifact": artifact}
-
-
-def _given(options: Options, reading: FilmReading) -> Mapping[str, Any]:
-    return {k: v for k, v in {**options.recipe(), **reading.recipe()}.items() if v is not None}
 
 
 def _several(job: _Job, clips: Sequence[Subject]) -> None:
@@ -368,7 +308,7 @@ def _several(job: _Job, clips: Sequence[Subject]) -> None:
     if job.chosen.as_json:
         document(
             "measurements",
-            {"measurements": [result.as_dict(anyway=job.chosen.anyway) for result in done]},
+            {"measurements": [result.answer.document for result in done]},
         )
     else:
         for result in done:
@@ -421,9 +361,9 @@ def _report(done: _Done, *, series: bool) -> None:
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")
-    if done.elsewhere is not None:
-        echo(f"  {done.elsewhere.sentence}")
-        say(f"  {done.elsewhere.advice}")
+    if (elsewhere := done.answer.elsewhere) is not None:
+        echo(f"  {elsewhere.sentence}")
+        say(f"  {elsewhere.advice}")
     if done.refinement is not None:
         echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:

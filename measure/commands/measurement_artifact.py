@@ -88,7 +88,7 @@ def report(measured: Measurement) -> Mapping[str, Any]:
         "sentence": measured.sentence,
         "model": measured.model,
         "quantities": {q.name: json_values(q) for q in measured.quantities},
-        "gate": measured.verdict.as_dict(),
+        "gate": json_values(measured.verdict),
         "combined": measured.combined,
         "findings": json_values(measured.notices(anyway=True)),
     }
@@ -137,8 +137,8 @@ def write(
         {
             _HEAD: {"format": _FORMAT},
             "targets": list(measured.names),
-            "answer": dict(measured.as_dict(anyway=True)),
-            "series": series.as_dict(),
+            "answer": measured.document(anyway=True),
+            "series": json_values(series),
             "refinement": None if refinement is None else dict(refinement),
         }
     )

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from measure.estimate.film_measuring import Measurement, measure
     from measure.estimate.film_posterior import DRAWS, FilmAnswer
     from measure.estimate.gusty_series import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
-    from measure.estimate.measurement_page import Context, Section
+    from measure.estimate.measurement_charts import winds
+    from measure.estimate.measurement_page import make_head, make_sections
     from measure.estimate.measurement_pictures import steps
     from measure.estimate.measuring_options import Options
     from measure.estimate.named_cloth import weight_of

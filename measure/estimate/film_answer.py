@@ -4,7 +4,8 @@ clip"."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from flagdata.answer import Bound, Quantity, Span
 from flagdata.core.arrays import FloatArray
@@ -19,18 +20,90 @@ LEAST_INFORMATION = 0.05
 [nat]. Below it the film
 did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation
 or more."""
-SHORT = {
-    "wind_speed": "wind",
-    "area_weight": "area weight",
-    "bending_scale": "bending",
-    "anisotropy": "anisotropy",
-    ASPECT: "logarithm of length over height",
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """How a quantity of a network is shown to people.
+
+    Attributes:
+        title: what they call it.
+        unit: "1" of a ratio.
+        digits: behind the point; None for two digits in all.
+        convert: makes the number of the network's.
+    """
+
+    title: str
+    unit: str
+    digits: int | None = None
+    convert: Callable[[float], float] = float
+
+    def number(self, value: float) -> str:
+        """Writes a value of the network's."""
+        shown = self.convert(value)
+        if self.digits is not None:
+            return f"{shown:.{self.digits}f}"
+        return f"{float(f'{shown:.1e}'):g}"
+
+    @property
+    def suffix(self) -> str:
+        """The unit behind a number, with the space before it."""
+        return "" if self.unit == "1" else f" {self.unit}"
+
+
+FORMS = {
+    "wind_speed": Form(title="wind", unit="m/s", digits=1),
+    "area_weight": Form(title="area weight", unit="kg/m²", digits=2),
+    "bending_scale": Form(
+        title="bending stiffness", unit="µN·m", convert=lambda log: 1e6 * 10.0**log
+    ),
+    "anisotropy": Form(title="bending, warp over weft", unit="1", convert=lambda log: 10.0**log),
+    ASPECT: Form(title="length over height", unit="1", digits=2, convert=math.exp),
 }
+"""Networks estimate logarithms of the last three; bending is the mean of 15 coefficients."""
+SHORT = {name: form.title for name, form in FORMS.items()}
 """Names in the one-line answer."""
 HEADLINE = ("wind_speed", "area_weight")
 """What the one-line answer is about."""
 _UNITS = {target.name: target.unit for target in TARGETS.values()}
-_DIGITS = {"wind_speed": 1, "area_weight": 2, "bending_scale": 2, "anisotropy": 2, ASPECT: 2}
+
+
+def form_of(quantity: Quantity) -> Form:
+    """Returns how a quantity is shown; a light flag's weight with a digit more."""
+    form = FORMS[quantity.name]
+    light = (
+        quantity.name == "area_weight"
+        and quantity.assumed is not None
+        and quantity.assumed[1] < 0.1
+    )
+    return replace(form, digits=3) if light else form
+
+
+def say(quantities: Mapping[str, Quantity], *, weight: bool = True) -> str:
+    """Says wind and, where the film constrains it, the cloth's weight in one sentence that can be
+    said aloud.
+
+    Args:
+        weight: whether the cloth is spoken of.
+    """
+    wind, cloth = (quantities.get(name) for name in HEADLINE)
+    said = [] if wind is None else [_say_one(wind, "the wind", "was")]
+    if weight and cloth is not None and cloth.constrained:
+        said.append(_say_one(cloth, "the cloth", "weighs", levelled=not said))
+    text = "; ".join(said)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _say_one(quantity: Quantity, subject: str, verb: str, *, levelled: bool = True) -> str:
+    form, span = form_of(quantity), quantity.span
+    if not quantity.constrained:
+        return f"the film does not constrain {subject}"
+    if span.bound is not None or quantity.value is None:
+        end = span.word(form.number, form.suffix)
+        return f"{subject} {verb} {end}, at {span.percent}"
+    ends = f"between {form.number(span.low)} and {form.number(span.high)}"
+    level = f" at {span.percent}" if levelled else ""
+    return f"{subject} {verb} {form.number(quantity.value)}{form.suffix}, {ends}{level}"
 
 
 def phrase(quantity: Quantity, *, first: bool) -> str:
@@ -39,22 +112,22 @@ def phrase(quantity: Quantity, *, first: bool) -> str:
     Args:
         first: whether the level of an interval is stated; that of a bound always is.
     """
-    short, span, suffix = SHORT[quantity.name], quantity.span, quantity.suffix
+    form, span = form_of(quantity), quantity.span
+    short, suffix = form.title, form.suffix
     if not quantity.constrained and quantity.assumed is not None:
         if quantity.given and quantity.assumed[0] == quantity.assumed[1]:
-            return f"{short} {quantity.assumed[0]:g}{suffix}, as given"
+            return f"{short} {form.convert(quantity.assumed[0]):g}{suffix}, as given"
         low, high = (_number(quantity, end) for end in quantity.assumed)
         if quantity.given:
             return f"{short} {low} to {high}{suffix}, as given"
         return f"{short}: not constrained by this clip (prior range {low} to {high}{suffix})"
-    digits = _digits_of(quantity)
     if span.bound is None:
-        interval = span.phrase(digits)
+        interval = span.word(form.number)
         return f"{short} {_number(quantity, quantity.value)}{suffix} {interval}" + (
             f" {span.percent}" if first else ""
         )
     why = "" if quantity.value is not None else f" ({_beyond(quantity)})"
-    return f"{short} {span.phrase(digits, suffix)}, {span.percent}{why}"
+    return f"{short} {span.word(form.number, suffix)}, {span.percent}{why}"
 
 
 def explain_bound(quantity: Quantity) -> Finding | None:
@@ -76,20 +149,11 @@ def explain_bound(quantity: Quantity) -> Finding | None:
 def _beyond(quantity: Quantity) -> str:
     low, high = quantity.assumed or quantity.interval
     verb, end = ("ends", high) if quantity.bound is Bound.LEAST else ("begins", low)
-    return f"the network's range {verb} at {_number(quantity, end)}{quantity.suffix}"
-
-
-def _digits_of(quantity: Quantity) -> int:
-    small = (
-        quantity.name == "area_weight"
-        and quantity.assumed is not None
-        and quantity.assumed[1] < 0.1
-    )  # of a flag
-    return _DIGITS[quantity.name] + small
+    return f"the network's range {verb} at {_number(quantity, end)}{form_of(quantity).suffix}"
 
 
 def _number(quantity: Quantity, value: float | None) -> str:
-    return "" if value is None else f"{value:.{_digits_of(quantity)}f}"
+    return "" if value is None else form_of(quantity).number(value)
 
 
 def quantities(

@@ -4,7 +4,7 @@ all."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -119,28 +119,30 @@ class Measurement:
         """Returns the findings, those on the answer where it is `shown`."""
         return (*self.findings, *self.bounds) if self.shown(anyway=anyway) else self.findings
 
-    def as_dict(self, *, anyway: bool) -> Mapping[str, Any]:
-        """Returns JSON values. What is not `shown` is left out."""
-        reported = self.shown(anyway=anyway)
-        return {
-            "film": self.film,
-            "rate": self.rate,
-            "duration": self.duration,
-            "model": self.model,
-            "options": {**self.options.recipe(), "seed": self.options.seed},
-            "gate": self.verdict.as_dict(),
-            "sentence": self.sentence if reported else None,
-            "quantities": {q.name: json_values(q) for q in self.quantities} if reported else None,
-            "windows": [window.as_dict() for window in self.windows] if reported else None,
-            "combined": self.combined,
-            "dependence": {
-                "wind": self.dependence.wind,
-                "cloth": self.dependence.cloth,
-                "source": self.dependence.source,
-            },
-            "gusts": None if self.gusts is None or not reported else self.gusts.as_dict(),
-            "findings": json_values(self.notices(anyway=anyway)),
-        }
+    def document(self, *, anyway: bool) -> dict[str, Any]:
+        """Returns JSON values. What is not `shown` is null."""
+        values = json_values(
+            {
+                "film": self.film,
+                "rate": self.rate,
+                "duration": self.duration,
+                "model": self.model,
+                "options": {**self.options.recipe(), "seed": self.options.seed},
+                "gate": self.verdict,
+                "sentence": self.sentence,
+                "quantities": {q.name: q for q in self.quantities},
+                "windows": self.windows,
+                "combined": self.combined,
+                "dependence": self.dependence,
+                "gusts": self.gusts,
+                "findings": self.notices(anyway=anyway),
+            }
+        )
+        return values if self.shown(anyway=anyway) else values | dict.fromkeys(_OF_ANSWER)
+
+
+_OF_ANSWER = ("sentence", "quantities", "windows", "gusts")
+"""What a document states of a film that may be measured."""
 
 
 def measure(

@@ -4,10 +4,10 @@ combined over windows and over the flag sizes considered."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -53,6 +53,13 @@ class WindowAnswer:
         p: probability that a familiar clip is at least as strange.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "start",
+        "end",
+        "p",
+        "quantities=by_name",
+    )
+
     start: float
     end: float
     quantities: tuple[Quantity, ...]
@@ -62,14 +69,10 @@ class WindowAnswer:
         """Returns the quantity of that name."""
         return next(quantity for quantity in self.quantities if quantity.name == name)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "start": self.start,
-            "end": self.end,
-            "p": self.p,
-            "quantities": {quantity.name: json_values(quantity) for quantity in self.quantities},
-        }
+    @property
+    def by_name(self) -> Mapping[str, Quantity]:
+        """Name → quantity."""
+        return {quantity.name: quantity for quantity in self.quantities}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -39,7 +39,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,6 +226,15 @@ class Gusts:
         windows: that it rests on.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "intensity=intensity.value",
+        "interval=intensity.interval",
+        "level=intensity.level",
+        "windows",
+        "constrained=intensity.constrained",
+        "sentence",
+    )
+
     intensity: Quantity
     windows: int
 
@@ -247,6 +256,14 @@ class Gusts:
         return cls(intensity=intensity, windows=windows)
 
     @property
+    def words(self) -> str:
+        """Says how strong they are, "14 % of the wind, between 9 and 21 %"."""
+        if not self.intensity.constrained or self.intensity.value is None:
+            return f"{self.windows} windows do not constrain how strong they are"
+        low, high = (f"{100 * end:.0f}" for end in self.intensity.interval)
+        return f"{100 * self.intensity.value:.0f} % of the wind, between {low} and {high} %"
+
+    @property
     def sentence(self) -> str:
         """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film
         narrows nothing."""
@@ -257,17 +274,6 @@ class Gusts:
             f"gusts of {100 * self.intensity.value:.0f} % {interval} of the wind, "
             f"{self.intensity.span.percent}"
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "intensity": self.intensity.value,
-            "interval": self.intensity.span.ends(),
-            "level": self.intensity.level,
-            "windows": self.windows,
-            "constrained": self.intensity.constrained,
-            "sentence": self.sentence,
-        }
 
 
 def log_moments(winds: FloatArray) -> tuple[float, float]:

@@ -1,180 +1,347 @@
-"""A measurement as one HTML file that refers to no other."""
+"""What a page says of a measured film: its first screen, and the sections below."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 
-from markupsafe import Markup
-
-from flagdata.answer import Quantity
+from flagdata.answer import Figure, Gallery, Head, Quantity, Section, Table
+from flagdata.answer.answer import Part
 from flagdata.answer.wind_elsewhere import WindComparison
-from flagdata.core.provenance import code_version
+from flagdata.core.findings import Finding, Severity
+from flagdata.lake import Artifact
 from flagdata.pages.page_pictures import moving
-from flagdata.pages.render import render
-from measure.estimate import measurement_pictures
-from measure.estimate.film_answer import SHORT
+from flagdata.timebase import NANOSECONDS, zone
+from measure.estimate import measurement_charts
+from measure.estimate.film_answer import FORMS, HEADLINE, SHORT, form_of
 from measure.estimate.film_measuring import Measurement
+from measure.estimate.measurement_pictures import steps
 from measure.estimate.nearest import Neighbour
-from measure.estimate.wind_by_window import Agreement, Beside
+from measure.estimate.wind_by_window import Beside
+from measure.film.film_source import Subject
 
 _SIDE = 220  # px of a clip
+FindNeighbours = Callable[[], tuple[Sequence[Neighbour], int]]
+"""Seeks the simulated clips nearest to a film, and says among how many."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A part of the page that another program made, such as a refinement by simulation.
-
-    Attributes:
-        anchor: its id in the page.
-        title: its heading.
-        body: HTML, already escaped.
-    """
-
-    anchor: str
-    title: str
-    body: Markup
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Context:
-    """What the page says of where a measurement is from.
-
-    Attributes:
-        provenance: rows of a table, in order.
-        known: what a simulated film states of itself; empty for a real one.
-        neighbours, compared: the nearest simulated clips, of so many; none where no lake was given.
-        rate: of the network's frames [Hz].
-        steps: picture of how the film was made fit, as a URL; None where it was too short for it.
-        figures: what was measured for that, in sentences.
-        elsewhere: the comparison with a wind from elsewhere; None where none was stated or no
-            estimate is shown.
-    """
-
-    provenance: Mapping[str, str]
-    known: Mapping[str, float]
-    neighbours: Sequence[Neighbour]
-    compared: int
-    rate: float
-    steps: str | None = None
-    figures: Sequence[str] = ()
-    elsewhere: WindComparison | None = None
-
-
-def page(
+def make_head(
     measured: Measurement,
     series: Beside,
-    context: Context,
+    subject: Subject,
     *,
     anyway: bool,
-    sections: Sequence[Section] = (),
-) -> str:
-    """Renders the page.
+    rate: float,
+    zone_name: str | None = None,
+    elsewhere: WindComparison | None = None,
+) -> Head:
+    """Makes the first screen: the film, its winds beside the anemometer's, and what there is to
+    know of them.
 
     Args:
-        anyway: whether estimates are shown although the gate refused the film; they are marked
-            then. Where there is nothing to measure, none are shown.
-        sections: what comes between the answer and its provenance, each under its own heading.
+        anyway: whether estimates are shown although the gate refused the film. Where there is
+            nothing to measure, none are.
+        rate: of the network's frames [Hz].
+        zone_name: of the clocks at the place; None where nobody said.
+        elsewhere: the comparison with a wind from elsewhere; None where none was stated.
     """
-    shown, noticed = measured.shown(anyway=anyway), measured.notices(anyway=anyway)
-    rows = [_row(quantity, context.known) for quantity in measured.quantities]
+    shown, film = measured.shown(anyway=anyway), subject.film
     spacing = measured.windows[0].end - measured.windows[0].start
-    clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate
-    values = {
-        "film": measured.film,
-        "shown": shown,
-        "refused": measured.verdict.refused,
-        "gate": measured.verdict.sentence,
-        "reasons": [reason.what for reason in measured.verdict.reasons],
-        "answer": measured.sentence,
-        "rows": rows,
-        "unconstrained": [row for row in rows if not row["constrained"]],
-        "wind": next(
-            (row for row in rows if row["name"] == SHORT["wind_speed"] and row["constrained"]), None
-        ),
-        "simulated": bool(context.known),
-        "level": f"{measured.options.level * 100:.3g} %",
-        "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
-        "neighbours": [_neighbour(one, context.rate) for one in context.neighbours],
-        "compared": context.compared,
-        "steps": context.steps,
-        "figures": list(context.figures),
-        "elsewhere": context.elsewhere,
-        "corner": measurement_pictures.corner(measured) if shown else None,
-        "series": measurement_pictures.series(series, level=measured.verdict.level)
-        if shown and len(series.time) > 1
-        else None,
-        "spectra": None
-        if series.spectrum is None or not shown
-        else measurement_pictures.spectra(series.spectrum),
-        "coherence": None if series.spectrum is None or not shown else series.spectrum.sentence,
-        "agreement": [
-            _agreement("over the window", series.window),
-            _agreement("minute mean", series.of_minute),
-        ]
-        if series.logged is not None and shown
-        else [],
-        "delay": _delay(series) if shown else None,
-        "windows": len(measured.verdict.window_p),
-        "combined": measured.combined,
-        "dependence": measured.dependence,
-        "gusts": None if measured.gusts is None or not shown else measured.gusts.sentence,
-        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in noticed],
-        "sections": list(sections),
-        "provenance": {**context.provenance, "code": code_version()},
-    }
-    return render("measure.estimate", "page.html.j2", values)
-
-
-def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | bool]:
-    digits = 3 if quantity.name == "area_weight" else 2
-    truth = truths.get(quantity.name)
-    bound_level = "" if quantity.bound is None else f" ({quantity.span.percent})"
-    low, high = quantity.assumed or quantity.interval
-    return {
-        "name": SHORT[quantity.name],
-        "unit": "" if quantity.unit == "1" else quantity.unit,
-        "constrained": quantity.constrained,
-        "value": "" if quantity.value is None else f"{quantity.value:.{digits}f}",
-        "interval": quantity.span.phrase(digits) + bound_level,
-        "assumed": f"{low:.{digits}f} to {high:.{digits}f}",
-        "information": "" if quantity.information is None else f"{quantity.information:.2f}",
-        "range": quantity.span.phrase(digits),
-        "level": quantity.span.percent,
-        "known": "" if truth is None else f"{truth:.{digits}f}",
-    }
-
-
-def _neighbour(neighbour: Neighbour, rate: float) -> dict[str, str]:
+    clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else rate
     figures = [
-        f"{SHORT[name]} {neighbour.known[name]:.{digits}f} {unit}"
-        for name, digits, unit in (("wind_speed", 1, "m/s"), ("area_weight", 3, "kg/m²"))
-        if name in neighbour.known
-    ]
-    return {
-        "name": neighbour.name,
-        "image": moving(neighbour.frames, rate=rate, side=_SIDE),
-        "known": ", ".join(figures),
-        "distance": f"{neighbour.distance:.1f}",
-    }
-
-
-def _agreement(title: str, agreement: Agreement | None) -> dict[str, str]:
-    if agreement is None:
-        return {"title": title, "text": "the anemometer was silent"}
-    return {"title": title, "text": agreement.sentence}
-
-
-def _delay(series: Beside) -> str | None:
-    if series.delay is None:
-        return None
-    if series.delay.offset is None or series.delay.reasons:
-        return (
-            "no delay between film and anemometer could be estimated: "
-            f"{'; '.join(series.delay.reasons)}"
+        Figure(
+            title="The film, as the network sees it",
+            content=lambda: moving(measured.clip, rate=clip_rate, side=_SIDE),
+            caption="The film, as the network sees it.",
+            width=_SIDE,
         )
-    sigma = "" if series.delay.sigma is None else f" ± {series.delay.sigma:.2f} s (1 σ)"
-    return (
-        f"{series.delay.offset:+.2f} s{sigma} are to be added to the film's clock to reach the "
-        "anemometer's"
+    ]
+    if shown and (len(series.time) > 1 or series.logged is not None):
+        logged = None if subject.record is None else subject.record.wind_1hz()
+        chart = measurement_charts.winds(
+            measured, series, start=film.start, logged=logged, zone_name=zone_name
+        )
+        figures.append(
+            Figure(
+                title="Wind of each window of the film, beside the anemometer's"
+                if series.logged is not None
+                else "Wind of each window of the film",
+                content=chart,
+            )
+        )
+    elif (picture := _steps_figure(subject)) is not None:
+        figures.append(picture)
+    compared = {} if elsewhere is None else {"wind elsewhere": _sentence(elsewhere.sentence)}
+    facts = {
+        "date and time": _time(film.start, measured.duration, zone_name),
+        **_place(subject.artifact),
+        "film": f"{measured.duration:.3g} s at {measured.rate:.4g} frames a second",
+        "size of the flag": _size(measured),
+        **(_cloth(measured) if shown else {}),
+        **({} if measured.gusts is None or not shown else {"gusts": measured.gusts.words}),
+        "anemometer": _sensor(subject),
+        "like the training": _windows(measured),
+        **compared,
+        **_simulated(subject.known or {}),
+    }
+    remarks = [] if elsewhere is None else [_sentence(elsewhere.advice)]
+    return Head(
+        figures=figures, facts=facts, limits=_limits(measured, anyway=anyway), remarks=remarks
+    )
+
+
+def make_sections(
+    measured: Measurement,
+    series: Beside,
+    subject: Subject,
+    *,
+    anyway: bool,
+    rate: float,
+    neighbours: FindNeighbours | None = None,
+    more: Sequence[Section] = (),
+) -> list[Section]:
+    """Makes the sections below, all folded.
+
+    Args:
+        anyway, rate: as of `make_head`.
+        neighbours: seeks the nearest simulated clips; None where there is no lake.
+        more: sections of others, such as a refinement's.
+    """
+    sections: list[Section] = []
+    if measured.shown(anyway=anyway):
+        sections.append(_quantities(measured))
+        if series.logged is not None:
+            sections.append(_beside(series))
+    sections += more
+    if neighbours is not None and (near := _neighbours(*neighbours(), rate)):
+        sections.append(near)
+    in_head = not measured.shown(anyway=anyway) or (len(series.time) < 2 and series.logged is None)
+    if (picture := _steps_figure(subject)) is not None and not in_head:
+        sections.append(
+            Section(title="How the film was made fit", parts=[picture], anchor="fit", folded=True)
+        )
+    verdict = measured.verdict
+    judged: list[Part] = [_sentence(verdict.sentence)]
+    if not verdict.refused:
+        judged += [_sentence(reason.what) for reason in verdict.reasons]
+    sections.append(
+        Section(title="Whether the network can judge it", parts=judged, anchor="gate", folded=True)
+    )
+    return sections
+
+
+def _limits(measured: Measurement, *, anyway: bool) -> list[Finding]:
+    """Selects what limits the answer, or why there is none: the gate's reasons, warnings, and what
+    is part of the answer."""
+    verdict = measured.verdict
+    reasons = [reason.finding for reason in verdict.reasons] if verdict.refused else []
+    said = {reason.kind for reason in reasons}
+    parts = measured.bounds if measured.shown(anyway=anyway) else ()
+    return reasons + [
+        one
+        for one in measured.notices(anyway=anyway)
+        if one.kind not in said and (one.severity is not Severity.NOTE or one in parts)
+    ]
+
+
+def _sentence(text: str) -> str:
+    """Makes a sentence of words: a capital before, a full stop behind."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _time(start: int | None, duration: float, zone_name: str | None) -> str:
+    if start is None:
+        return "not known; times count from the first frame"
+    end = start + round(duration * NANOSECONDS)
+    known = UTC if zone_name is None else zone(zone_name)
+    first, last = (datetime.fromtimestamp(one / NANOSECONDS, known) for one in (start, end))
+    clock = "UTC" if zone_name is None else f"local time ({zone_name})"
+    return f"{first.day} {first:%B %Y}, {first:%H:%M:%S} to {last:%H:%M:%S}, {clock}"
+
+
+def _place(artifact: Artifact | None) -> dict[str, str]:
+    """Returns place and clock of a recording, as far as its row in the lake states them."""
+    if artifact is None:
+        return {}
+    rows = {} if artifact.session is None else {"session": artifact.session}
+    if artifact.clock_sigma is not None:
+        rows["clock"] = (
+            f"film and anemometer on one clock to ± {artifact.clock_sigma:.2g} s (1 σ), by "
+            f"{artifact.clock_method or 'alignment'}"
+        )
+    return rows
+
+
+def _size(measured: Measurement) -> str:
+    size = measured.options.size
+    if size is not None:
+        return f"{size.length:g} m × {size.height:g} m, as given"
+    return "not given; several are considered"
+
+
+def _cloth(measured: Measurement) -> dict[str, str]:
+    """Returns what is known of the cloth's weight where the sentence does not say it."""
+    for quantity in measured.quantities:
+        if quantity.name == HEADLINE[1] and not (
+            quantity.constrained and not measured.verdict.refused
+        ):
+            return {SHORT[quantity.name]: _words(quantity)}
+    return {}
+
+
+def _words(quantity: Quantity) -> str:
+    form = form_of(quantity)
+    if quantity.constrained:
+        return f"{_value(quantity)} {_interval(quantity)}{form.suffix}".strip()
+    low, high = map(form.number, quantity.assumed or quantity.interval)
+    ends = (low if low == high else f"{low} to {high}") + form.suffix
+    return f"{ends}, as given" if quantity.given else f"not constrained by this film ({ends})"
+
+
+def _sensor(subject: Subject) -> str:
+    wind = None if subject.record is None else subject.record.wind()
+    if wind is None:
+        return "none beside the film"
+    height = "" if wind.sensor.height is None else f", {wind.sensor.height:g} m above ground"
+    return f"{wind.sensor.name}{height}"
+
+
+def _windows(measured: Measurement) -> str:
+    strange, count = measured.verdict.strange_count, len(measured.verdict.window_p)
+    familiar = f"{count - strange} of {count} windows" if strange else f"all {count} windows"
+    apart = measured.combined < count - strange and not measured.verdict.refused
+    return familiar + (f"; the answer rests on {measured.combined} that are apart" if apart else "")
+
+
+def _simulated(known: Mapping[str, float]) -> dict[str, str]:
+    truths = [
+        f"{form.title} {known[name]:.3g}{form.suffix}"
+        for name, form in FORMS.items()
+        if name in HEADLINE and name in known
+    ]
+    return {"simulated with": ", ".join(truths)} if truths else {}
+
+
+def _quantities(measured: Measurement) -> Section:
+    percent = f"{measured.options.level * 100:.3g} %"
+    columns = ["quantity", "value", percent, "before the film", "learned from it [nat]"]
+    rows = [
+        [
+            form_of(quantity).title,
+            *_cells(quantity),
+            "" if quantity.information is None else f"{quantity.information:.2f}",
+        ]
+        for quantity in measured.quantities
+    ]
+    combined, alike = measured.combined, measured.dependence
+    rests = f"The answer rests on {combined} of {len(measured.verdict.window_p)} windows"
+    if combined > 1:
+        in_wind = "" if measured.gusts is not None else f"{alike.wind:.2f} in wind and "
+        rests += (
+            f": one cloth, a wind for each. Their errors count as correlated by {in_wind}"
+            f"{alike.cloth:.2f} in cloth ({alike.source})"
+        )
+    corner = Figure(
+        title="Joint posterior of the quantities",
+        content=lambda: measurement_charts.corner(measured),
+        caption="Draws of all quantities, and of their pairs. Shaded: the interval. Gray: not "
+        "constrained by the film.",
+    )
+    return Section(
+        title="All quantities",
+        parts=[
+            Table(columns=columns, rows=rows),
+            f"{rests}.",
+            corner,
+        ],
+        anchor="quantities",
+        folded=True,
+    )
+
+
+def _cells(quantity: Quantity) -> list[str]:
+    """Returns value, interval and what was assumed, in the quantity's unit."""
+    form = form_of(quantity)
+    low, high = map(form.number, quantity.assumed or quantity.interval)
+    assumed = f"{low if low == high else f'{low} to {high}'}{form.suffix}"
+    if not quantity.constrained:
+        return ["", "as given" if quantity.given else "not constrained", assumed]
+    return [_value(quantity), _interval(quantity), assumed]
+
+
+def _value(quantity: Quantity) -> str:
+    form = form_of(quantity)
+    return "" if quantity.value is None else f"{form.number(quantity.value)}{form.suffix}"
+
+
+def _interval(quantity: Quantity) -> str:
+    form, span = form_of(quantity), quantity.span
+    if span.bound is None:
+        return span.word(form.number)
+    return f"{span.word(form.number, form.suffix)} ({span.percent})"
+
+
+def _beside(series: Beside) -> Section:
+    parts: list[Part] = []
+    for title, agreement in (("over the window", series.window), ("minute mean", series.of_minute)):
+        said = "the anemometer was silent" if agreement is None else agreement.sentence
+        parts.append(f"Against the anemometer, {title}: {said}.")
+    if series.delay is not None:
+        parts.append(f"Clocks: {series.delay.sentence}.")
+    if series.spectrum is not None:
+        spectrum = series.spectrum
+        parts += [
+            Figure(
+                title="Spectra and coherence of film and anemometer",
+                content=lambda: measurement_charts.spectra(spectrum),
+            ),
+            f"{spectrum.sentence}.",
+        ]
+    return Section(
+        title="The film beside the anemometer", parts=parts, anchor="anemometer", folded=True
+    )
+
+
+def _neighbours(neighbours: Sequence[Neighbour], compared: int, rate: float) -> Section | None:
+    if not neighbours:
+        return None
+    note = (
+        f"The nearest of {compared} simulated clips drawn from the lake, by the distance of the "
+        "summaries that the network makes of them."
+    )
+    return Section(
+        title="The simulated clips nearest to the film",
+        parts=[
+            Gallery(figures=[_neighbour(one, rate) for one in neighbours]),
+            note,
+        ],
+        anchor="nearest",
+        folded=True,
+    )
+
+
+def _neighbour(neighbour: Neighbour, rate: float) -> Figure:
+    known = ", ".join(
+        f"{SHORT[name]} {FORMS[name].number(neighbour.known[name])}{FORMS[name].suffix}"
+        for name in HEADLINE
+        if name in neighbour.known
+    )
+    return Figure(
+        title="Simulated clip",
+        content=lambda: moving(neighbour.frames, rate=rate, side=_SIDE),
+        caption=f"Simulated: {known}; {neighbour.distance:.1f} standard deviations away.",
+        width=_SIDE,
+    )
+
+
+def _steps_figure(subject: Subject) -> Figure | None:
+    picture = steps(subject.film)
+    if picture is None:
+        return None
+    return Figure(
+        title="A frame with the moving cloths numbered and the square that is judged",
+        content=picture,
+        caption="A frame of the film. Rust: all places that the cloth visits; outside of them the "
+        "film is frozen. Blue: other moving cloths, which --flag chooses by their numbers. Yellow: "
+        "the square that is judged.",
     )

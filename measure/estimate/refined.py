@@ -18,7 +18,7 @@ from measure.estimate.film_measuring import Measurement
 from measure.film.film_source import Subject
 from measure.film.similarity import LOGARITHMS, POWERS
 from measure.refine.refine_command import Clip, run
-from measure.refine.refinement import Interval, Refinement
+from measure.refine.refinement import Refined, Refinement
 from models.networks.targets import ASPECT, Cloth
 from models.trained.estimator import Estimator
 
@@ -91,11 +91,11 @@ def scale_refinement(refinement: Refinement, s: float) -> Refinement:
     )
 
 
-def _all_scaled(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:
+def _all_scaled(intervals: tuple[Refined, ...], s: float) -> tuple[Refined, ...]:
     return tuple(_scale_interval(interval, s) for interval in intervals)
 
 
-def _scale_interval(interval: Interval, s: float) -> Interval:
+def _scale_interval(interval: Refined, s: float) -> Refined:
     name = interval.name.partition(".")[0]
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)
@@ -106,6 +106,6 @@ def _scale_interval(interval: Interval, s: float) -> Interval:
     )
     return replace(
         interval,
-        median=None if interval.median is None else interval.median * factor + shift,
+        value=None if interval.value is None else interval.value * factor + shift,
         span=scaled_span,
     )

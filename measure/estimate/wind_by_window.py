@@ -23,10 +23,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
+from flagdata.answer import Span
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.core.schema import TRUTH_WINDOW
@@ -64,17 +65,31 @@ class Agreement:
         bounded: of these, windows with a bound instead of a value.
         bias: mean difference of the others [m/s]; None where there are none.
         rmse: root mean square of the same [m/s], likewise.
-        interval: 90 % of the RMSE, by resampling blocks of `_BLOCK` [m/s]; None where there are
+        rmse_span: 90 % of the RMSE, by resampling blocks of `_BLOCK` [m/s]; None where there are
             fewer than `_FEWEST`.
         covered: share of all windows compared whose interval contains the reference.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "count",
+        "bounded",
+        "bias",
+        "rmse",
+        "interval",
+        "covered",
+    )
 
     count: int
     bounded: int
     bias: float | None
     rmse: float | None
-    interval: tuple[float, float] | None
+    rmse_span: Span | None
     covered: float
+
+    @property
+    def interval(self) -> list[float | None] | None:
+        """Ends of the RMSE's interval [m/s]; None without one."""
+        return None if self.rmse_span is None else self.rmse_span.ends()
 
     @property
     def sentence(self) -> str:
@@ -85,21 +100,9 @@ class Agreement:
         if self.bias is None or self.rmse is None:
             return covered
         errors = f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s"
-        if self.interval is None:
+        if self.rmse_span is None:
             return f"{errors} (without an interval: too few windows), {covered}"
-        low, high = self.interval
-        return f"{errors} [{low:.2f}, {high:.2f}] 90 %, {covered}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "count": self.count,
-            "bounded": self.bounded,
-            "bias": self.bias,
-            "rmse": self.rmse,
-            "interval": None if self.interval is None else list(self.interval),
-            "covered": self.covered,
-        }
+        return f"{errors} {self.rmse_span.phrase(2)} {self.rmse_span.percent}, {covered}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,6 +116,16 @@ class Spectrum:
         chance: coherence that independent series exceed at one frequency in twenty.
         windows: length of the run.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "sentence",
+        "frequency",
+        "estimated",
+        "logged",
+        "coherence",
+        "chance",
+        "windows",
+    )
 
     frequency: FloatArray
     estimated: FloatArray
@@ -154,18 +167,6 @@ class Spectrum:
             "common"
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "sentence": self.sentence,
-            "frequency": self.frequency.tolist(),
-            "estimated": self.estimated.tolist(),
-            "logged": self.logged.tolist(),
-            "coherence": self.coherence.tolist(),
-            "chance": self.chance,
-            "windows": self.windows,
-        }
-
 
 @dataclass(frozen=True, kw_only=True)
 class Delay:
@@ -180,9 +181,19 @@ class Delay:
     sigma: float | None
     reasons: tuple[str, ...]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {"offset": self.offset, "sigma": self.sigma, "reasons": list(self.reasons)}
+    @property
+    def sentence(self) -> str:
+        """Phrases it, without a full stop."""
+        if self.offset is None or self.reasons:
+            return (
+                "no delay between film and anemometer could be estimated: "
+                f"{'; '.join(self.reasons)}"
+            )
+        sigma = "" if self.sigma is None else f" ± {self.sigma:.2f} s (1 σ)"
+        return (
+            f"{self.offset:+.2f} s{sigma} are to be added to the film's clock to reach the "
+            "anemometer's"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,6 +211,14 @@ class Beside:
         spectrum: None where the series is too short.
         delay: None without an anemometer.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "window",
+        "minute=of_minute",
+        "spectrum",
+        "delay",
+    )
+    """What is concluded; the columns are elsewhere."""
 
     time: FloatArray
     wind: FloatArray
@@ -233,16 +252,6 @@ class Beside:
         yield list(columns)
         for values in zip(*columns.values(), strict=True):
             yield ["" if math.isnan(value) else f"{value:.6g}" for value in values]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values of what is concluded; the columns are elsewhere."""
-        parts = {
-            "window": self.window,
-            "minute": self.of_minute,
-            "spectrum": self.spectrum,
-            "delay": self.delay,
-        }
-        return {name: None if part is None else part.as_dict() for name, part in parts.items()}
 
 
 def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None) -> Beside:
@@ -304,12 +313,12 @@ def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement 
         bounded=count - len(off),
         bias=float(off.mean()) if valued else None,
         rmse=float(np.sqrt(np.mean(off**2))) if valued else None,
-        interval=_rmse_interval(off, series.time[both], seed),
+        rmse_span=_rmse_span(off, series.time[both], seed),
         covered=float(inside.mean()),
     )
 
 
-def _rmse_interval(off: FloatArray, time: FloatArray, seed: int) -> tuple[float, float] | None:
+def _rmse_span(off: FloatArray, time: FloatArray, seed: int) -> Span | None:
     """Computes the RMSE's 90 % interval by resampling blocks of windows; None of too few."""
     if not len(off):
         return None
@@ -320,7 +329,7 @@ def _rmse_interval(off: FloatArray, time: FloatArray, seed: int) -> tuple[float,
     drawn = stream(seed, "agreement").integers(len(sums), size=(_RESAMPLES, len(sums)))
     values = np.sqrt(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
     low, high = np.quantile(values, [0.05, 0.95])
-    return float(low), float(high)
+    return Span(low=float(low), high=float(high), level=0.9, bound=None, estimated=True)
 
 
 def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spectrum | None:

@@ -260,8 +260,9 @@ class ConditionedFilm:
         before = len(self._film.findings())
         return tuple(finding.what for finding in self.findings()[before:])
 
-    def as_dict(self) -> dict[str, Any] | None:
-        """Returns JSON values of what was found; None before a reading."""
+    @property
+    def figures(self) -> dict[str, Any] | None:
+        """What was found, as JSON values; None before a reading."""
         if self.found is None or self._follower is None:
             return None
         conditioning, follower = self.found, self._follower

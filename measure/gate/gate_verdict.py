@@ -42,16 +42,16 @@ rate is largest for τ about the length of the recording, and up to 1.14 times t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import bdtrc, ndtr, ndtri
 
 from flagdata.core.arrays import BoolArray
-from flagdata.core.findings import Finding
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError
 
 SHARE = 0.25
@@ -86,6 +86,8 @@ class Reason:
         check: the score that shows it; empty for what was counted in the film.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = ("kind", "what", "p", "value", "fix")
+
     kind: str
     what: str
     p: float | None
@@ -109,15 +111,16 @@ class Reason:
             return Reason(kind=self.kind, what=self.what, p=p, fix=self.fix, blank=self.blank)
         return Reason(kind="unlike-training", what=self.figure, p=p)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "kind": self.kind,
-            "what": self.what,
-            "p": self.p,
-            "value": self.value,
-            "fix": self.fix,
-        }
+    @property
+    def finding(self) -> Finding:
+        """The same as a finding, whose value is the figure or the p."""
+        return Finding(
+            kind=self.kind,
+            severity=Severity.WARNING,
+            what=self.what,
+            fix=self.fix,
+            value=self.value if self.p is None else self.p,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +141,18 @@ class Verdict:
         window_reasons: of a usual window, among the strange ones where these refuse the recording;
             the strongest first.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "refused",
+        "p",
+        "level",
+        "false_alarm",
+        "strange=strange_count",
+        "refusing",
+        "windows=window_p",
+        "blank=blank_count",
+        "reasons",
+    )
 
     false_alarm: float
     level: float
@@ -192,10 +207,31 @@ class Verdict:
         return np.array(self.window_p) <= self.level
 
     @property
+    def strange_count(self) -> int:
+        """How many windows are strange."""
+        return int(self.strange.sum())
+
+    @property
+    def blank_count(self) -> int:
+        """How many windows show nothing to measure."""
+        return sum(self.blank)
+
+    @property
+    def refusal(self) -> str:
+        """Says in a few words why the film is refused, without a figure."""
+        if not self.measurable:
+            return "there is nothing to measure in it"
+        if self.faults:
+            return self.faults[0].what.partition(": ")[0].partition(", as ")[0]
+        if self.unlike:
+            return "it is not like the films that the network was trained on"
+        return "it depends on the size of the flag, which was not given"
+
+    @property
     def sentence(self) -> str:
         """Phrases the verdict; of a film that is refused with the level that is applied and the
         rate it keeps to."""
-        strange, count = int(self.strange.sum()), len(self.window_p)
+        strange, count = self.strange_count, len(self.window_p)
         windows = (
             f"p = {self.p:.2g} (refused from {self.level:.2g} down)"
             if count == 1
@@ -228,20 +264,6 @@ class Verdict:
                 f"{self.reasons[0].what}"
             )
         return f"like the films that the network was trained on: {windows}"
-
-    def as_dict(self) -> Mapping[str, Any]:
-        """Returns JSON values."""
-        return {
-            "refused": self.refused,
-            "p": self.p,
-            "level": self.level,
-            "false_alarm": self.false_alarm,
-            "strange": int(self.strange.sum()),
-            "refusing": self.refusing,
-            "windows": list(self.window_p),
-            "blank": int(sum(self.blank)),
-            "reasons": [reason.as_dict() for reason in self.reasons],
-        }
 
 
 def verdict(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from measure.refine.metamodel import Metamodel
     from measure.refine.procedure import Settings, refine, squared_embedding_distance
     from measure.refine.refine_command import Clip, run
-    from measure.refine.refinement import Interval, Refinement, Round
+    from measure.refine.refinement import Refined, Refinement, Round
     from measure.refine.simulator import FilmRequest, Simulator
     from measure.refine.space import AREA_WEIGHT_COLUMN, QUANTITIES, WIND_COLUMN, Space
     from measure.refine.target import Target

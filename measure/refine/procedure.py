@@ -46,7 +46,7 @@ from measure.refine.refined_posterior import (
     posterior,
     regressors,
 )
-from measure.refine.refinement import Interval, Refinement, Round, intervals_of
+from measure.refine.refinement import Refined, Refinement, Round, intervals_of
 from measure.refine.simulator import Simulator
 from measure.refine.space import DIMENSION, WIND_COLUMN, Space
 from measure.refine.target import Target, knows_view
@@ -416,7 +416,7 @@ class _Run:
             self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000)
         )
 
-    def _intervals(self, current: Posterior) -> tuple[Interval, ...]:
+    def _intervals(self, current: Posterior) -> tuple[Refined, ...]:
         prior = self._prior()
         spans = self._spans(self.space.reported_quantities(current.points), prior)
         for clip in range(1, len(self.targets)):
@@ -424,7 +424,7 @@ class _Run:
             spans = (*spans, replace(wind, name=f"{wind.name}.{clip}"))
         return spans
 
-    def _spans(self, draws: FloatArray, prior: FloatArray) -> tuple[Interval, ...]:
+    def _spans(self, draws: FloatArray, prior: FloatArray) -> tuple[Refined, ...]:
         area_weight, limits = self.space.area_weight, limits_of("area_weight")
         learned = next(target for target in self.estimator.targets if target.name == "area_weight")
         if (
@@ -510,7 +510,7 @@ class _Run:
                 "that is searched, so that only a bound is given",
             )
             for entry in self._intervals(current)
-            if entry.median is None
+            if entry.value is None
         ]
         if not self.evaluators[0].simulator.draws_damping:
             out.append(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
-from flagdata.answer import Span
+from flagdata.answer import Quantity, Span
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
-from flagdata.core.json_values import json_values
 from flagdata.recipes.typed_tables import Range
 from measure.posterior_ends import span
 from measure.refine.evaluator import Evaluator
@@ -32,51 +31,42 @@ METHOD = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interval:
-    """A central interval.
+class Refined(Quantity):
+    """A quantity of `QUANTITIES`; of clips after the first, the wind's name has the clip's number
+    behind it. Its value is the posterior's median.
 
     Attributes:
-        name: of `QUANTITIES`; of clips after the first, the wind's has the clip's number behind it.
-        unit: SI.
-        median: of the posterior; None where its draws pile up at an end of the range beyond which
-            there may be more.
-        span: the central interval, or a bound on one side (`measure.posterior_ends`).
         prior_share: width of the central interval over that of the prior's of the same level: near
             1 where the clip does not constrain it.
     """
 
-    name: str
-    unit: str
-    median: float | None
-    span: Span
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "name",
+        "unit",
+        "median=value",
+        "low=span.low",
+        "high=span.high",
+        "level",
+        "bound",
+        "prior_share",
+    )
+
     prior_share: float
 
-    def phrase(self, digits: int, unit: str = "") -> str:
-        """Words median and interval, or the bound, without the level.
 
-        Args:
-            unit: with the space before it.
-        """
-        interval_text = self.span.phrase(digits, unit)
-        return (
-            f"{self.median:.{digits}f}{unit} {interval_text}"
-            if self.median is not None and not self.span.bound
-            else interval_text
-        )
+def phrase(quantity: Quantity, digits: int, unit: str = "") -> str:
+    """Words value and interval, or the bound, without the level.
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; an end that nothing bounds is null."""
-        low, high = self.span.ends()
-        return {
-            "name": self.name,
-            "unit": self.unit,
-            "median": self.median,
-            "low": low,
-            "high": high,
-            "level": self.span.level,
-            "bound": None if self.span.bound is None else self.span.bound.value,
-            "prior_share": self.prior_share,
-        }
+    Args:
+        digits: behind the point.
+        unit: with the space before it.
+    """
+    interval_text = quantity.span.phrase(digits, unit)
+    return (
+        f"{quantity.value:.{digits}f}{unit} {interval_text}"
+        if quantity.value is not None and not quantity.bound
+        else interval_text
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +85,7 @@ class Round:
     evaluations: int
     distance: float
     floor: float
-    intervals: tuple[Interval, ...]
+    intervals: tuple[Refined, ...]
     seconds: float
 
 
@@ -125,10 +115,29 @@ class Refinement:
             times less.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "method",
+        "targets=names",
+        "level",
+        "intervals",
+        "amortised",
+        "bending",
+        "rounds",
+        "distances",
+        "floor",
+        "reached",
+        "stopped",
+        "evaluations",
+        "effective_draws=posterior.effective",
+        "seconds",
+        "seed",
+        "findings",
+    )
+
     targets: tuple[Target, ...]
     level: float
-    intervals: tuple[Interval, ...]
-    amortised: tuple[Interval, ...]
+    intervals: tuple[Refined, ...]
+    amortised: tuple[Refined, ...]
     bending: FloatArray
     rounds: tuple[Round, ...]
     traces: tuple[Trace, ...]
@@ -154,33 +163,24 @@ class Refinement:
         parts = []
         for entry, title in zip(self.intervals, ("wind", "area weight"), strict=False):
             parts.append(
-                f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} {entry.span.percent}"
+                f"{title} {phrase(entry, digits[entry.name], entry.suffix)} {entry.span.percent}"
             )
         return f"{', '.join(parts)}, n = {self.evaluations} simulated clips"
 
-    def as_dict(self) -> dict[str, Any]:
-        """As JSON: no arrays of draws, no pictures."""
-        return {
-            "method": METHOD,
-            "targets": [target.name for target in self.targets],
-            "level": self.level,
-            "intervals": [entry.as_dict() for entry in self.intervals],
-            "amortised": [entry.as_dict() for entry in self.amortised],
-            "bending": self.bending.tolist(),
-            "rounds": [
-                {**vars(r), "intervals": [entry.as_dict() for entry in r.intervals]}
-                for r in self.rounds
-            ],
-            "distances": [_finite(trace.distances) for trace in self.traces],
-            "floor": self.floor,
-            "reached": self.reached,
-            "stopped": self.stopped,
-            "evaluations": self.evaluations,
-            "effective_draws": self.posterior.effective,
-            "seconds": self.seconds,
-            "seed": self.seed,
-            "findings": json_values(self.findings),
-        }
+    @property
+    def method(self) -> str:
+        """How the answer was found, in words."""
+        return METHOD
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the targets."""
+        return tuple(target.name for target in self.targets)
+
+    @property
+    def distances(self) -> tuple[FloatArray, ...]:
+        """Of all clips to each target, NaN where none could be simulated."""
+        return tuple(trace.distances for trace in self.traces)
 
 
 def intervals_of(
@@ -190,7 +190,7 @@ def intervals_of(
     *,
     ranges: Sequence[Range],
     limits: Sequence[tuple[float, float]],
-) -> tuple[Interval, ...]:
+) -> tuple[Refined, ...]:
     """Estimates intervals of draws (n, quantity) beside the prior's.
 
     Args:
@@ -214,16 +214,13 @@ def intervals_of(
                 draws[:, i], places, level=level, limits=limits[i], assumed=(first, last)
             )
         intervals.append(
-            Interval(
+            Refined(
                 name=quantity.name,
                 unit=quantity.unit,
-                median=float(middle[i]) if span_of_draws.estimated else None,
+                value=float(middle[i]) if span_of_draws.estimated else None,
+                sigma=None,
                 span=span_of_draws,
                 prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
             )
         )
     return tuple(intervals)
-
-
-def _finite(values: FloatArray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

@@ -544,7 +544,7 @@ def test_a_still_film_and_a_black_one_are_given_no_number(model: Estimator, anyw
         found = measured(Frames(time=np.arange(2 * FRAMES) / RATE, images=images), model)
         assert found.verdict.refused
         assert not found.shown(anyway=anyway)
-        assert found.as_dict(anyway=anyway)["quantities"] is None
+        assert found.document(anyway=anyway)["quantities"] is None
 
 
 def test_a_part_in_which_nothing_moves_is_no_part_of_the_answer_even_anyway(
@@ -581,7 +581,7 @@ def test_a_refused_film_gives_no_estimate_unless_asked_for(model: Estimator) -> 
         options=Options(size=WHOLE),
     )
     assert found.verdict.refused
-    shown, hidden = found.as_dict(anyway=True), found.as_dict(anyway=False)
+    shown, hidden = found.document(anyway=True), found.document(anyway=False)
     assert hidden["quantities"] is hidden["windows"] is hidden["sentence"] is None
     strong = measure(
         film,
@@ -590,8 +590,8 @@ def test_a_refused_film_gives_no_estimate_unless_asked_for(model: Estimator) -> 
         dependence=APART,
         options=Options(size=WHOLE),
     )
-    assert "m/s" not in str(strong.as_dict(anyway=False))
-    assert "m/s" in str(strong.as_dict(anyway=True)["findings"])
+    assert "m/s" not in str(strong.document(anyway=False))
+    assert "m/s" in str(strong.document(anyway=True)["findings"])
     assert shown["sentence"] == found.sentence
     assert hidden["gate"]["reasons"][0]["kind"] == "listed"
 

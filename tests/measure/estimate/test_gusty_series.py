@@ -13,6 +13,7 @@ from scipy.integrate import dblquad
 from scipy.stats import multivariate_normal
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, InputError
 from measure.anemometer import network
@@ -204,8 +205,8 @@ def test_stronger_scatter_is_read_as_stronger_gusts() -> None:
 def test_an_intensity_as_wide_as_its_prior_has_no_value_in_words() -> None:
     even = Gusts.of(np.linspace(0, 0.5, 1001), level=0.9, windows=2)
     assert even.sentence == "gusts: 2 windows do not constrain how strong they are"
-    assert not even.as_dict()["constrained"]
-    assert even.as_dict()["interval"] == pytest.approx([0.025, 0.475])
+    assert not json_values(even)["constrained"]
+    assert json_values(even)["interval"] == pytest.approx([0.025, 0.475])
 
 
 def test_moments_are_those_of_a_log_normal_wind_and_draws_below_calm_air_are_borne() -> None:

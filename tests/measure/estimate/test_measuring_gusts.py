@@ -96,7 +96,7 @@ def test_one_window_and_a_model_without_constants_are_answered_as_before(
     several = measured(even(3 * FRAMES), model)
     (note,) = [finding for finding in several.findings if finding.kind == "windows-apart"]
     assert f"how the model {model.name} errs in windows of one film was not measured" in note.what
-    assert several.as_dict(anyway=True)["gusts"] is None
+    assert several.document(anyway=True)["gusts"] is None
 
 
 def test_windows_that_bound_the_wind_are_no_series_and_keep_their_bounds(
@@ -150,7 +150,7 @@ def test_the_gusts_are_in_the_json_and_in_the_terminal(
 ) -> None:
     found = measured(even(6 * FRAMES), series_model)
     assert found.gusts is not None
-    told = found.as_dict(anyway=True)["gusts"]
+    told = found.document(anyway=True)["gusts"]
     assert told["sentence"] == found.gusts.sentence
     assert told["interval"] == list(found.gusts.intensity.interval)
     subject: Any = SimpleNamespace(known=None)
@@ -181,5 +181,5 @@ def test_python_has_the_gusts_with_their_interval(
         found.gusts.intensity.value,
         found.gusts.intensity.interval,
     )
-    assert gusts.constrained == found.gusts.as_dict()["constrained"]
+    assert gusts.constrained == found.gusts.intensity.constrained
     assert answer_of(measured(film, model)).gusts is None

@@ -38,7 +38,7 @@ def test_the_first_of_two_flags_is_found_and_the_camera_is_steadied(reference_da
     film = ConditionedFilm(CameraFilm(reference_data / CLIP))
     pictures = np.stack([picture for _, picture in film.frames(0.0, 10.0)])
     assert pictures.shape == (250, 300, 300)
-    found = film.as_dict()
+    found = film.figures
     assert found is not None
     # By eye: the flag's hoist is at 88 px, its tip reaches 345 px; the second flag lies below 235
     # px.

@@ -12,18 +12,20 @@ import numpy as np
 import pytest
 
 from flagdata.answer import Bound, Span
+from flagdata.core.json_values import json_values
 from flagdata.core.stated import parse
 from measure.estimate import Options
 from measure.estimate.refined import _searched_range, refine_window, scale_refinement
-from measure.refine import Clip, Interval, Refinement, Round
+from measure.refine import Clip, Refined, Refinement, Round
+from measure.refine.refinement import phrase
 from models.networks.targets import Cloth
 
 NOTHING: Any = None
 
 
-def interval(name: str, median: float, half: float) -> Interval:
+def interval(name: str, median: float, half: float) -> Refined:
     own = Span(low=median - half, high=median + half, level=0.9, bound=None, estimated=True)
-    return Interval(name=name, unit="", median=median, span=own, prior_share=0.5)
+    return Refined(name=name, unit="", value=median, sigma=None, span=own, prior_share=0.5)
 
 
 @pytest.fixture
@@ -63,10 +65,10 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
     simulated flag."""
     larger = scale_refinement(found, 4.0)
     by_name = {entry.name: entry for entry in larger.intervals}
-    assert (by_name["wind_speed"].median, by_name["wind_speed"].span.high) == (8.0, 9.0)
+    assert (by_name["wind_speed"].value, by_name["wind_speed"].span.high) == (8.0, 9.0)
     assert by_name["wind_speed.1"].span.low == 10.0
-    assert by_name["area_weight"].median == pytest.approx(0.48)
-    assert by_name["bending_scale"].median == pytest.approx(-4.0 + math.log10(256))
+    assert by_name["area_weight"].value == pytest.approx(0.48)
+    assert by_name["bending_scale"].value == pytest.approx(-4.0 + math.log10(256))
     assert by_name["bending_scale"].span.high - by_name["bending_scale"].span.low == pytest.approx(
         0.4
     )
@@ -75,17 +77,17 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
 
 def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
     least = Span(low=9.4, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
-    strong = replace(found.intervals[0], median=None, span=least)
+    strong = replace(found.intervals[0], value=None, span=least)
     larger = scale_refinement(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
     assert larger.intervals[0].span == replace(least, low=18.8)
-    interval = larger.intervals[0].as_dict()
+    interval = json_values(larger.intervals[0])
     assert (interval["median"], interval["low"], interval["high"], interval["bound"]) == (
         None,
         18.8,
         None,
         "at-least",
     )
-    assert larger.intervals[0].phrase(2, " m/s") == "at least 18.80 m/s"
+    assert phrase(larger.intervals[0], 2, " m/s") == "at least 18.80 m/s"
 
 
 def test_what_has_no_size_stays(found: Refinement) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.answer import Bound, Quantity, Span
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
@@ -134,7 +135,7 @@ def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(
     assert (series.window.bias, series.window.covered) == (None, 1.0)
     assert series.delay is not None
     assert series.delay.offset is None
-    json.dumps(series.as_dict(), allow_nan=False)
+    json.dumps(json_values(series), allow_nan=False)
     header, first = list(series.rows())[:2]
     assert dict(zip(header, first, strict=True)) | {"time": "", "p": ""} == {
         "time": "",
@@ -197,7 +198,7 @@ def test_the_frequency_up_to_which_film_and_anemometer_agree_is_reported(
         windows=40,
     )
     assert re.search(sentence, found.sentence)
-    assert found.as_dict()["sentence"] == found.sentence
+    assert json_values(found)["sentence"] == found.sentence
 
 
 def test_a_gap_or_a_constant_leaves_no_spectrum_of_what_is_too_short() -> None:

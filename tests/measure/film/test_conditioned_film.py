@@ -55,7 +55,7 @@ def test_a_part_of_a_film_has_its_own_instants(monkeypatch: pytest.MonkeyPatch) 
 def test_a_crop_confines_the_search_for_the_flag_and_does_not_cut_it() -> None:
     made = ConditionedFilm(film(TWO), crop=CropBox(x=140, y=40, width=80, height=70))
     read(made)
-    found = made.as_dict()
+    found = made.figures
     assert found is not None
     (flag,) = found["flags"]
     assert 150 < flag["box"][0] < 170
@@ -68,7 +68,7 @@ def test_the_second_of_two_flags_is_measured_where_it_is_chosen() -> None:
     made = ConditionedFilm(film(TWO), flag=2)
     assert "several-flags-found" not in kinds(made)  # nothing was read yet
     read(made)
-    found = made.as_dict()
+    found = made.figures
     assert found is not None
     assert (len(found["flags"]), found["chosen"]) == (2, 2)
     assert found["square"][0] + found["square"][2] / 2 > 150
@@ -85,7 +85,7 @@ def test_what_the_camera_did_is_stated_with_its_figures() -> None:
     assert "camera-still" in kinds(still)
     (found,) = [finding for finding in moving.findings() if finding.kind == "camera-moves"]
     shake = float(np.sqrt(np.square(np.diff(swaying(2.0), axis=0)).sum(axis=1).mean()))
-    document = moving.as_dict()
+    document = moving.figures
     assert document is not None
     assert document["camera"]["shake"] == pytest.approx(shake, rel=0.03)
     assert f"shakes {document['camera']['shake']:.2f} px" in found.what
@@ -109,6 +109,6 @@ def test_a_film_of_two_frames_is_shown_as_it_is() -> None:
     images = Drawn().frames()[:2]
     made = ConditionedFilm(Frames(time=TIMES[:2], images=images))
     np.testing.assert_array_equal(read(made), images)
-    assert made.as_dict() is None
+    assert made.figures is None
     assert steps(made) is None
     assert made.sentences == ()

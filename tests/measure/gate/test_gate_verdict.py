@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
 from measure.gate import FamiliarityGate, Reason, Verdict
@@ -89,8 +90,8 @@ def test_of_a_hundred_windows_48_that_are_strange_refuse_and_few_do_not() -> Non
     assert judged(26).refused
     assert not judged(25).refused
     assert "25 of 100 windows look unfamiliar (refused from 26 on)" in judged(25).sentence
-    assert judged(25).as_dict()["level"] == judged(25).level
-    assert (judged(25).as_dict()["strange"], judged(25).as_dict()["refusing"]) == (25, 26)
+    assert json_values(judged(25))["level"] == judged(25).level
+    assert (json_values(judged(25))["strange"], json_values(judged(25))["refusing"]) == (25, 26)
 
 
 def test_a_recording_of_which_most_windows_are_strange_is_refused_with_the_reason_of_a_usual_one() -> (

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
+from flagdata.answer import Answer
+from flagdata.answer.charts import Dots
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed
 from flagdata.errors import InputError
 from measure.estimate.refined import scale_refinement
@@ -25,7 +27,7 @@ from measure.refine import (
     Target,
     refine,
 )
-from measure.refine.refinement_section import section
+from measure.refine.refinement_section import refinement_section, trace_chart
 from models.trained.estimator import Estimator
 from sim.run import Recipe
 
@@ -121,37 +123,40 @@ def test_two_clips_share_a_cloth_and_have_a_wind_each(
     ]
 
 
+def shown(refinement: Refinement, *, in_motion: bool = True) -> str:
+    """The page of nothing but the section of a refinement."""
+    section = refinement_section(refinement, in_motion=in_motion)
+    answer = Answer(
+        question="measure", subject="film", sentence="s", make_sections=lambda: (section,)
+    )
+    return answer.page
+
+
 def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refinement) -> None:
-    page = section(whole)
-    assert whole.sentence in page
+    page = shown(whole).partition('id="refinement"')[2].partition("</details>")[0]
+    assert whole.sentence[1:] in page
     assert page.count("image/webp") == 2
     assert [f"step {step}:" in page for step in (0, 10, 20, 40)] == [True, True, True, False]
-    assert page.count("<tr>") == 1 + len(QUANTITIES) + 1 + 15
-    for entry in whole.as_dict()["intervals"]:
+    tables = [part for part in page.split("<table>")[1:] if "<th" in part]
+    assert sum(table.count("<tr>") for table in tables) >= 1 + len(QUANTITIES) + 1 + 15
+    for entry in json_values(whole)["intervals"]:
         assert entry["low"] <= entry["median"] <= entry["high"]
 
 
-def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
-    whole: Refinement, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_charts_of_a_flag_four_times_as_large_have_twice_the_winds(whole: Refinement) -> None:
     """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as
     the intervals."""
-    drawn: list[Figure] = []
-    monkeypatch.setattr(
-        "measure.refine.refinement_section.figure_url",
-        lambda figure, dpi: drawn.append(figure) or "",
-    )
     larger = scale_refinement(whole, 4.0)
     captions = [
-        np.array(re.findall(r"step \d+: ([\d.]+) m/s", section(one, in_motion=False))).astype(float)
+        np.array(re.findall(r"step \d+: ([\d.]+) m/s", shown(one, in_motion=False))).astype(float)
         for one in (whole, larger)
     ]
     np.testing.assert_allclose(captions[1], 2 * captions[0], atol=0.015)
-    before, after = (figure.axes[1] for figure in drawn)
-    np.testing.assert_allclose(
-        after.lines[0].get_ydata(), 2 * np.asarray(before.lines[0].get_ydata())
-    )
-    np.testing.assert_allclose(after.get_ylim(), 2 * np.array(before.get_ylim()))
+    before, after = (trace_chart(one).rows[0][1] for one in (whole, larger))
+    dots = [panel.marks[0] for panel in (before, after)]
+    assert all(isinstance(one, Dots) for one in dots)
+    np.testing.assert_allclose(dots[1].y, 2 * np.asarray(dots[0].y))  # type: ignore[union-attr]
+    np.testing.assert_allclose(after.y.limits, 2 * np.array(before.y.limits))
 
 
 def test_a_budget_too_small_for_an_interval_is_refused() -> None:
