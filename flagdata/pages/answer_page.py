@@ -18,9 +18,9 @@ def render_answer(answer: Answer) -> str:
     """Renders the page, HTML."""
     provenance = {**answer.provenance, "code": code_version()}
     sections = list(answer.make_sections())
-    limits = [one.what if isinstance(one, Finding) else one for one in answer.head.limits]
-    if further := [one for one in answer.findings if one.what not in limits]:
-        title = f"What {'else ' if limits else ''}was noticed: {len(further)}"
+    said = {one.kind for one in answer.head.limits if isinstance(one, Finding)}
+    if further := [one for one in answer.findings if one.kind not in said]:
+        title = f"What {'else ' if said else ''}was noticed: {len(further)}"
         sections.append(Section(title=title, parts=[further], anchor="findings", folded=True))
     where = Section(
         title="Where it is from",

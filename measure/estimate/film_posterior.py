@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from flagdata.answer import Quantity
 from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.core.findings import Finding
-from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.stated import Stated
 from measure.estimate.combine import OWN, Dependence, combine_windows, effective

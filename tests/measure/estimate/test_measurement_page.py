@@ -74,7 +74,7 @@ def test_the_sentence_stands_first_and_can_be_said_aloud(
 
 
 @pytest.mark.parametrize("clear", [True, False])
-def test_a_sentence_states_wind_and_weight_with_their_ends_as_far_as_the_film_tells_them(
+def test_a_sentence_states_wind_and_weight_with_their_ends_as_far_as_the_film_constrains_them(
     found: Measurement, model: Estimator, clear: bool
 ) -> None:
     def told(name: str, value: float, low: float, high: float) -> object:
