@@ -3,7 +3,8 @@ the gusts are.
 
 What the network says of window w is its posterior of the wind there. m_w and s_w are the mean and
 the standard deviation of the logarithm of a log-normal distribution of the same moments
-(`log_moments`), so that draws near zero wind, or slightly negative, carry no extra weight. With u_w the logarithm of the true wind,
+(`log_moments`), so that draws near zero wind, or slightly negative, carry no extra weight.
+With u_w the logarithm of the true wind,
 
     m_w = u_w + b + e_w,     u_w = μ + g_w.
 

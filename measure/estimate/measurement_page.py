@@ -35,8 +35,8 @@ def make_head(
     zone_name: str | None = None,
     elsewhere: WindComparison | None = None,
 ) -> Head:
-    """Makes the first screen: the film, its winds beside the anemometer's, and what there is to
-    know of them.
+    """Makes the first screen: the film, its winds beside the anemometer's, and the facts about
+    them.
 
     Args:
         anyway: whether estimates are shown although the gate refused the film. Where there is
@@ -180,7 +180,7 @@ def _size(measured: Measurement) -> str:
 
 
 def _cloth(measured: Measurement) -> dict[str, str]:
-    """Returns what is known of the cloth's weight where the sentence does not say it."""
+    """Returns the cloth's weight where the sentence does not state it."""
     for quantity in measured.quantities:
         if quantity.name == HEADLINE[1] and not (
             quantity.constrained and not measured.verdict.refused

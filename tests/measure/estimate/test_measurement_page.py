@@ -60,7 +60,7 @@ def words(page: str) -> str:
     return " ".join(unescape(re.sub(r"<[^>]*>", " ", shown)).split())
 
 
-def test_the_sentence_stands_first_and_can_be_said_aloud(
+def test_the_sentence_stands_first_and_is_short_enough_to_say(
     found: Measurement, model: Estimator
 ) -> None:
     answer = answered(found, model)
@@ -117,7 +117,7 @@ def test_a_wind_from_elsewhere_is_compared_on_the_page_too(
     assert "wind elsewhere" not in words(answered(found, model).page)
 
 
-def test_a_bound_is_said_as_one_without_a_value(model: Estimator) -> None:
+def test_a_bound_is_reported_as_one_without_a_value(model: Estimator) -> None:
     strong = measured(even(3 * FRAMES), far(model, 0, 1.0))
     strong = replace(strong, verdict=replace(strong.verdict, p=0.5))
     answer = answered(strong, model)
@@ -167,7 +167,7 @@ def test_a_refused_film_is_shown_without_estimates_unless_asked_for_and_then_mar
     assert len(marked.sentence.split()) < 25
 
 
-def test_what_limits_the_answer_is_said_once_with_what_to_do(
+def test_a_limit_of_the_answer_is_reported_once_with_what_to_do(
     found: Measurement, model: Estimator
 ) -> None:
     said = words(answered(found, model).page)
