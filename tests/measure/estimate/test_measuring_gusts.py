@@ -13,11 +13,11 @@ import pytest
 from flagdata.core.stated import Stated
 from flagdata.ingest.films.film_array import Frames
 from measure.commands.measure import _Done, _report
-from measure.commands.measure_film import answer_of
 from measure.estimate import SERIES_KEY, Measurement, Options, Pair, SeriesErrors, beside, measure
 from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, even
 from tests.measure.estimate.test_film_measuring import APART, WHOLE, Listed, far
+from tests.measure.estimate.test_measurement_page import answered
 
 ERRORS = SeriesErrors(
     opened=Pair(shared=0.5, own=0.3),
@@ -157,10 +157,9 @@ def test_the_gusts_are_in_the_json_and_in_the_terminal(
     done = _Done(
         measured=found,
         series=beside(found, start=None, wind=None),
-        artifact=None,
         subject=subject,
         refinement=None,
-        elsewhere=None,
+        answer=answered(found, series_model),
     )
     _report(done, series=True)
     assert f"  {found.gusts.sentence}\n" in capsys.readouterr().out
@@ -175,11 +174,11 @@ def test_python_has_the_gusts_with_their_interval(
     film = even(6 * FRAMES)
     found = measured(film, series_model)
     assert found.gusts is not None
-    gusts = answer_of(found).gusts
+    gusts = answered(found, series_model).gusts
     assert gusts is not None
     assert (gusts.value, gusts.interval) == (
         found.gusts.intensity.value,
         found.gusts.intensity.interval,
     )
     assert gusts.constrained == found.gusts.intensity.constrained
-    assert answer_of(measured(film, model)).gusts is None
+    assert answered(measured(film, model), model).gusts is None
