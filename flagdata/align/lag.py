@@ -14,10 +14,11 @@ shape nor its noise is known, so the estimator uses only that it rises:
    the maximum-likelihood weighting of Knapp and Carter, IEEE Trans. ASSP 24 (1976) 320.
 4. r(o) is the correlation of the two at offset o over the n(o) bins that both cover, z = atanh(r)
    √(n − 3) its score. The estimate is where z is greatest, refined by a parabola.
-5. σ is that of the regression y = g x(t + o) + ε in o, with dependent scores ψ_k = (y_k − g x_k) dx_k/dt:
-   σ² = Λ / (n (g var(dx/dt))²), Λ the long-run variance of ψ (Newey and West, 1987). Where exp(z²/2), the likelihood
-   over all of the peak, is wider than that, its standard deviation counts. The uncertainty of the flag's response and
-   of the stamps is added in quadrature.
+5. σ is that of the regression y = g x(t + o) + ε in o, with dependent scores
+   ψ_k = (y_k − g x_k) dx_k/dt:
+   σ² = Λ / (n (g var(dx/dt))²), Λ the long-run variance of ψ (Newey and West, 1987). Where
+   exp(z²/2), the likelihood over all of the peak, is wider than that, its standard deviation
+   counts. The uncertainty of the flag's response and of the stamps is added in quadrature.
 6. Chance is measured, not assumed: winds with the same spectrum and random phases (Theiler et al.,
    1992) go through step 4, and a Gumbel distribution fitted to their greatest scores gives the
    probability of a score as high by accident. A periodic wind stays periodic under this, and so

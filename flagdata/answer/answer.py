@@ -1,8 +1,8 @@
-"""What a question to a recording is answered by: a sentence, quantities, findings, and sections with
-tables and figures.
+"""What a question to a recording is answered by: a sentence, quantities, findings, and sections
+with tables and figures.
 
-The same answer is shown in a terminal, as JSON, as a page, in a notebook and as an artifact, each by
-one renderer. A question brings its sentences, tables and figures, and no renderer.
+The same answer is shown in a terminal, as JSON, as a page, in a notebook and as an artifact, each
+by one renderer. A question brings its sentences, tables and figures, and no renderer.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ class Line:
     Attributes:
         x, y: (n,).
         label: in the legend; none where it is empty.
-        marker: of each point: "o" a disc, "s" a square, "D" a diamond, "^" a triangle; none where it
-            is empty.
+        marker: of each point: "o" a disc, "s" a square, "D" a diamond, "^" a triangle; none where
+            it is empty.
     """
 
     x: Numbers

@@ -262,7 +262,8 @@ def calibrate(chosen: Calibrating) -> Calibrated:
     it.
 
     ```python
-    table = {"time": time, "wind": wind, "droop": droop, "extension": extension, "frequency": frequency}
+    table = {"time": time, "wind": wind, "droop": droop, "extension": extension}
+    table["frequency"] = frequency
     found = flagdata.calibrate(table, flag_size=(1.5, 1.0), azimuth_deg="70±7")
     found.quantities["area_weight"].interval  # kg/m²
     ```
@@ -345,7 +346,9 @@ def close_loop(chosen: Closing) -> Closed:
     """What the model of a tracked cloth lacks, as `flagdata close-loop` finds it.
 
     ```python
-    verdict = flagdata.close_loop([slow, fast], rest=rest, rate=25.0, wind=[4.0, 7.0], material="camel-ponte-roma")
+    verdict = flagdata.close_loop(
+        [slow, fast], rest=rest, rate=25.0, wind=[4.0, 7.0], material="camel-ponte-roma"
+    )
     verdict.named, verdict.strengths  # ("lift",), {"lift": coefficient 1.4 [0.8, 2.0]}
     ```
 

@@ -89,7 +89,9 @@ def simulate(chosen: Simulating) -> Simulated:
     in a lake.
 
     ```python
-    flags = flagdata.simulate(wind={"speed": 5.0}, time={"frames": 50}, effects={"lift": {"coefficient": 1.0}})
+    flags = flagdata.simulate(
+        wind={"speed": 5.0}, time={"frames": 50}, effects={"lift": {"coefficient": 1.0}}
+    )
     flags.positions, flags.time  # (member, frame, vertex, 3) m with z up, (frame,) s
     ```
 

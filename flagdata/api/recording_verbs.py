@@ -131,7 +131,9 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
     align` does.
 
     ```python
-    aligned = flagdata.align("flag", "anemometer", lake="field.lake", by="given", clock_offset=-0.4, offset_sigma=0.1)
+    aligned = flagdata.align(
+        "flag", "anemometer", lake="field.lake", by="given", clock_offset=-0.4, offset_sigma=0.1
+    )
     aligned["recording"], aligned["clock"]["offset"]  # id, s
     ```
 
@@ -272,7 +274,8 @@ class FromCamera(Clocked):
         metavar="HZ",
     )
     crop: str = option(
-        "x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
+        "x,y,width,height in px of the upright image; whole, square, or auto (where the motion "
+        "is).",
         default="whole",
         section=CAMERA,
         metavar="BOX",
@@ -446,7 +449,9 @@ def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
     `flagdata ingest` does.
 
     ```python
-    film, wind = flagdata.ingest(["flag.mp4", "anemometer.csv"], lake="field.lake", session="monday")
+    film, wind = flagdata.ingest(
+        ["flag.mp4", "anemometer.csv"], lake="field.lake", session="monday"
+    )
     film.artifact.id, wind.report["samples"]
     ```
 

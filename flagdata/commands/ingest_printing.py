@@ -1,4 +1,4 @@
-"""What `flagdata ingest` prints for people: the report of an ingest, and what a source seems to be."""
+"""What `flagdata ingest` prints: the report of an ingest, and what a source seems to be."""
 
 from __future__ import annotations
 

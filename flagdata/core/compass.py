@@ -129,7 +129,8 @@ def _letters(north: str, east: str, south: str, west: str) -> dict[str, float]:
 
 
 _KANJI = {"N": "北", "E": "東", "S": "南", "W": "西"}
-# Japanese joins the letters as English does (北東, 東北東); Chinese puts east and west first (东北, 东东北).
+# Japanese joins the letters as English does (北東, 東北東);
+# Chinese puts east and west first (东北, 东东北).
 _FAR_EAST = {
     "".join(_KANJI[letter] for letter in spelled): _DEGREES[point]
     for point in _ROSE

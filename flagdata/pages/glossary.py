@@ -16,7 +16,8 @@ GLOSSARY: dict[str, str] = {
     "simulations. On films it counts simulated flags, as fewer if those of one set-up are alike.",
     "p": "The share of numerical set-ups, or of null flags, that deviate from the base model at "
     "least as much as the "
-    "recordings. The recordings count as one more. A small p is evidence that something is missing.",
+    "recordings. The recordings count as one more. A small p is evidence that something is "
+    "missing.",
     "evidence": "Words for p: very strong up to 0.001, strong up to 0.01, moderate up to 0.05, "
     "weak up to 0.1, "
     "above 0.1 little or none.",

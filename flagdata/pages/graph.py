@@ -4,8 +4,8 @@ its left.
 Boxes of a column are ordered by where their neighbours are (the barycentre method of Sugiyama,
 Tagawa and Toda, 1981); a line that passes a column gets a place in it, so that it crosses no box.
 Colours are attributes, which a page's style overrides by the classes. It is no chart of
-`flagdata.answer.charts`: its boxes are links, their places are counted in pixels of text, and a lake
-is browsed where matplotlib is not installed.
+`flagdata.answer.charts`: its boxes are links, their places are counted in pixels of text, and a
+lake is browsed where matplotlib is not installed.
 """
 
 from __future__ import annotations

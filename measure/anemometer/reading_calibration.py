@@ -146,7 +146,8 @@ class ReadingCalibration:
             "blocks of time that were "
             f"left out, n = {self.windows} windows; {self.level:.0%} within "
             f"±{self.half_width:.2f} m/s) "
-            f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated_rmse:.2f} m/s"
+            f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated_rmse:.2f} "
+            "m/s"
         )
 
     @property

@@ -263,7 +263,8 @@ def _sentences(joint: Joint) -> list[str]:
     if joint.conclusion is Conclusion.SUFFICIENT:
         return [
             (
-                f"The base model is not rejected by markers and films together ({test}): no effect is "
+                f"The base model is not rejected by markers and films together ({test}): no effect "
+                "is "
                 "needed."
             )
         ]

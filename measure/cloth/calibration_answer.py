@@ -224,7 +224,8 @@ def _recording_section(recording: Fitted, calibration: Calibration) -> Section:
         title=f"{recording.observed.name}: {recording.windows} windows against the wind",
         parts=[
             (
-                f"Of simulated flags of this cloth {share} look as unusual as this one, or more so. The "
+                f"Of simulated flags of this cloth {share} look as unusual as this one, or more "
+                "so. The "
                 f"wind was {recording.wind_speed:.1f} m/s in the mean."
             ),
             Figure(
@@ -244,7 +245,8 @@ def _check_section(calibration: Calibration) -> Section:
         title="How far the interval is to be relied on",
         parts=[
             (
-                f"The same procedure weighed {check.count} simulated flags that it was not fitted to. "
+                f"The same procedure weighed {check.count} simulated flags that it was not fitted "
+                "to. "
                 f"{check.held} of them have their weight in the interval at "
                 f"{calibration.level * 100:.3g} %; the median error is {check.median_error:.1%}."
             )

@@ -67,7 +67,8 @@ class Weighable(Strengths):
             name=self.name,
             unit=self.column.unit,
             prior=Range(low=self.low, high=self.high, scale=scale),
-            source="from what a minute of film hardly shows to beyond what is expected in the field",
+            source="from what a minute of film hardly shows to beyond what is expected in the "
+            "field",
         )
 
 

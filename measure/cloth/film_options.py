@@ -51,7 +51,7 @@ class OfFilms(OfFlag):
         was=("--size",),
         metavar="LxH",
     )
-    attachment: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  as the source states
+    attachment: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]
         "How the cloth is held: at both corners of its hoist, or along all of the hoist; of "
         "markers also top-corners, "
         "or u,v;u,v;… [m]. By default corners, of markers as the source states.",

@@ -94,11 +94,13 @@ def assumptions(
     steady = bool(constant_wind(recordings))
     sentences = [
         (
-            "the flag has the stated size and is held as stated, and the camera is where it is stated "
+            "the flag has the stated size and is held as stated, and the camera is where it is "
+            "stated "
             "to be"
         ),
         (
-            "area weight, bending and damping are calibrated, so that what only changes them is not an "
+            "area weight, bending and damping are calibrated, so that what only changes them is "
+            "not an "
             "effect"
         ),
     ]

@@ -159,7 +159,8 @@ STRETCHING = Uncertain(
     name="stretching",
     unit="1",
     prior=_log(0.5, 2.0),
-    source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
+    source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary "
+    "it",
 )
 FABRIC = Uncertain(
     name="fabric",

@@ -306,7 +306,8 @@ def _moving_figure(outcome: SolvedLoop, index: int, *, after: str) -> Figure:
     return Figure(
         title=f"{name} beside simulations",
         content=draw,
-        caption=f"{WINDOW:g} s of {name} beside what {models} in the same wind. Single waves differ; "
+        caption=f"{WINDOW:g} s of {name} beside what {models} in the same wind. Single waves "
+        "differ; "
         "compare how high the flag flies, how far it reaches and how much it beats.",
     )
 
@@ -330,7 +331,8 @@ def _sections(verdict: Verdict, outcome: SolvedLoop, moving: Sequence[Figure]) -
         made.append(_errors(verdict))
     suspected = verdict.test.suspected
     statistic = (
-        f"The statistic is z of {suspected}, the only direction that is tested, since it was stated "
+        f"The statistic is z of {suspected}, the only direction that is tested, since it was "
+        "stated "
         "beforehand."
         if suspected
         else "The statistic is the largest z of an effect's direction, or that of the whole misfit "
@@ -396,7 +398,8 @@ def _errors(verdict: Verdict) -> Section:
         ),
         (
             "Other halves: calibrated on one half of each recording, compared with the other, both "
-            "ways. Recordings left out: calibrated on all others. The scatter of replicates is how far "
+            "ways. Recordings left out: calibrated on all others. The scatter of replicates is how "
+            "far "
             "simulations of one cloth and view scatter: no model predicts better."
         ),
     ]

@@ -40,13 +40,15 @@ if TYPE_CHECKING:
 
 
 @options
-class CalibrateCommand(AsJson, Shared, Calibrating, Keeping):  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
+class CalibrateCommand(  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
+    AsJson, Shared, Calibrating, Keeping
+):
     """The same on the command line, the reading model that is made beside, and what is written."""
 
     recordings: tuple[str, ...] = argument(
         "Recordings of one flag; see `flagdata.calibrate`.", "RECORDING..."
     )
-    flag_size: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  refused with a fix
+    flag_size: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]
         f"{LENGTHS}.", default=None, section=FLAG, metavar="LxH"
     )
     only: str | None = option(
@@ -385,7 +387,8 @@ def _fit_lines(calibration: Calibration) -> list[str]:
     return [
         *lines,
         (
-            f"intervals of {check.held} of {check.count} simulations left out contain their weight, "
+            f"intervals of {check.held} of {check.count} simulations left out contain their "
+            "weight, "
             f"median error {check.median_error:.1%}"
         ),
     ]

@@ -47,7 +47,7 @@ class MeasureCommand(AsJson, Measuring, Keeping):
     """The same on the command line: which of a lake's clips, what is refined, and what is
     written."""
 
-    source: str | None = argument(  # pyright: ignore[reportIncompatibleVariableOverride]  or a query
+    source: str | None = argument(  # pyright: ignore[reportIncompatibleVariableOverride]
         "The film; see `flagdata.measure`.", "[SOURCE]", default=None
     )
     query: str | None = option(

@@ -41,7 +41,8 @@ class ObserveCommand(AsJson, Observing, Keeping):
         metavar="FOLDER",
     )
     picture: Path | None = option(
-        "Draw each observable against time, and against the log's wind where the recording has one.",
+        "Draw each observable against time, and against the log's wind where the recording has "
+        "one.",
         default=None,
         section=WRITTEN,
         type=LocalPath(),

@@ -97,7 +97,8 @@ def _sentence(clock: Recovered) -> str:
     side = "ahead of" if clock.offset > 0 else "behind"
     holds = "holds" if clock.covered else "does not hold"
     return (
-        f"The log's clock is {abs(clock.offset):.1f} s {side} the camera's; the 90 % interval {holds} "
+        f"The log's clock is {abs(clock.offset):.1f} s {side} the camera's; the 90 % interval "
+        f"{holds} "
         "the truth, which is in neither file"
     )
 
@@ -113,7 +114,8 @@ def _sections(
         else ""
     )
     counted = (
-        f"{len(pairs)} pairs of {CLIP_FRAMES} frames at {FRAME_RATE:g} Hz{refused}. {len(places)} of "
+        f"{len(pairs)} pairs of {CLIP_FRAMES} frames at {FRAME_RATE:g} Hz{refused}. {len(places)} "
+        "of "
         "them, by wind:"
     )
     yield Section(

@@ -286,7 +286,8 @@ def _drapes_section(found: Draped) -> Section:
                 ],
             ),
             (
-                f"Of simulated drapes of this cloth {100 * found.fit.tail:.2g} % look as unusual, or more so. "
+                f"Of simulated drapes of this cloth {100 * found.fit.tail:.2g} % look as unusual, "
+                "or more so. "
                 f"The answer rests on {found.fit.effective:.0f} independent draws."
             ),
         ],

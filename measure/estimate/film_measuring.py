@@ -554,7 +554,8 @@ def _at_ends(quantities: Sequence[Quantity], windows: Sequence[WindowAnswer]) ->
                 "windows-at-end",
                 f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs "
                 "may lie beyond "
-                "what the model knows, and so may the mean over all windows lie beyond its interval",
+                "what the model knows, and so may the mean over all windows lie beyond its "
+                "interval",
                 count=sum(bounded),
                 fix="give the wind of single windows by --windows",
             )

@@ -423,9 +423,10 @@ class Course:
 
     def given(self, intensity: float, length: float) -> tuple[FloatArray, FloatArray]:
         """Computes mean (k,) and covariance (k, k) of the logarithms of the winds given the gusts'
-        two numbers: with K of the gusts, Σ = K + that of own errors and a = 1 − KΣ⁻¹1,
+            two numbers: with K of the gusts, Σ = K + that of own errors and a = 1 − KΣ⁻¹1,
 
-            μ̂ 1 + KΣ⁻¹(m − μ̂ 1),     K − KΣ⁻¹K + a aᵀ/(1ᵀΣ⁻¹1) + σ² 11ᵀ,     σ of the shared error.
+                μ̂ 1 + KΣ⁻¹(m − μ̂ 1),     K − KΣ⁻¹K + a aᵀ/(1ᵀΣ⁻¹1) + σ² 11ᵀ,     with σ
+        of the shared error.
         """
         gusts, ones = self.gusts(intensity, length), np.ones_like(self.logs)
         factor = cho_factor(gusts + self.own, lower=True)

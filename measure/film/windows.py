@@ -158,7 +158,8 @@ def lay_out(
     )
     if layout.count < 1:
         raise InputError(
-            f"{layout.last - layout.first:.2f} s of film, a measurement takes {layout.length:.2f} s",
+            f"{layout.last - layout.first:.2f} s of film, a measurement takes {layout.length:.2f} "
+            "s",
             where="length of the film",
             fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} "
             "Hz; "

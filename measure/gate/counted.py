@@ -312,7 +312,8 @@ def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
         return (
             hoist.held,
             (
-                f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} "
+                f"cloth is beside {_below(hoist.held)} of what is most like one, of flags "
+                f"{_HELD:.0%} "
                 "or more"
             ),
         )
@@ -331,7 +332,8 @@ def _padding_figure(film: _Film) -> Figure | None:
     return (
         beyond,
         (
-            f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be "
+            f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most "
+            "can be "
             "measured"
         ),
     )

@@ -103,7 +103,8 @@ REASONS: dict[str, Fault] = {
     "no-background": Fault(
         sentence="the picture may show too little but what moves",
         of_motion=True,
-        fix="film from farther away, so that the whole flag and its surroundings are in the picture",
+        fix="film from farther away, so that the whole flag and its surroundings are in the "
+        "picture",
     ),
     "another-shape": Fault(
         sentence="what moves is longer than the flag that was given, and may be another thing",

@@ -9,7 +9,9 @@ REASONS = {
     NO_SILHOUETTE: "the cloth's outline was not found in enough frames",
     NO_MOTION: "the free edge hardly moves, so that its spectrum is noise",
     NO_WAVE: "no wave travels along the chord: the phases at its sections do not belong together",
-    EDGE_ON: "the flag flies towards the camera or away from it: hardly any of it is in the picture",
+    EDGE_ON: (
+        "the flag flies towards the camera or away from it: hardly any of it is in the picture"
+    ),
     FEW_FRAMES: "the window has fewer frames than the observable takes",
 }
 """Kind of reason, by which windows are counted → a sentence for people."""

@@ -20,7 +20,8 @@ WAVE_LENGTH = Observable(
     unit="1",
     meaning="length, in flag lengths along the picture, of the wave that travels along the "
     "silhouette's middle line",
-    blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
+    blind="waves whose crests are along the line of sight's direction of motion, and standing "
+    "waves",
     pixels=wave_length,
     geometry=wave_length,
     bias=0.278,

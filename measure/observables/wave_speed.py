@@ -20,7 +20,8 @@ WAVE_SPEED = Observable(
     unit="1/s",
     meaning="speed, in flag lengths a second, at which the silhouette's middle line travels away "
     "from the hoist",
-    blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
+    blind="waves whose crests are along the line of sight's direction of motion, and standing "
+    "waves",
     pixels=wave_speed,
     geometry=wave_speed,
     bias=0.408,

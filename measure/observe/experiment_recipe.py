@@ -1,23 +1,26 @@
 """Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is
 named.
 
-    title, up           "z", "-y", …: the axis of the recordings that points up; all other entries use z up
+    title, up           "z", "-y", …: the axis of the recordings that points up; all other entries
+                        use z up
     [test]              level of the global test, nulls: how many null recordings
-    [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices of the model mesh
-    [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); mass-unknown, or
-                        area-weight: a number, or '0.155±0.003' of a cloth that was weighed; thicken, damping,
-                        stretching-factor, bending-factor
-    [attachment]        at = "hoist-corners" | "top-corners" | "hoist", or points = [[u, v], …]; stiffness, or
-                        rigid = true
+    [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices
+                        of the model mesh
+    [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); mass-unknown,
+                        or area-weight: a number, or '0.155±0.003' of a cloth that was weighed;
+                        thicken, damping, stretching-factor, bending-factor
+    [attachment]        at = "hoist-corners" | "top-corners" | "hoist", or points = [[u, v], …];
+                        stiffness, or rigid = true
     [air]               gravity, density, drag (of the quadratic normal force)
-    [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a recording of a table
-                        that holds several), name, rate, unit, rest-unit, noise
-    [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
-                        (an artifact's id or an anemometer's file) with axis or north (where it lies, from +x towards
-                        +y), and clock-offset [s], added to the recording's clock to reach the log's, both counted
-                        from their first samples, or start (ISO 8601);
-                        sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not state them;
-                        accept (the hash that confirms a drafted reading, as a refusal shows it)
+    [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a
+                        recording of a table that holds several), name, rate, unit, rest-unit, noise
+    [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x
+                        towards +y); or log (an artifact's id or an anemometer's file) with axis or
+                        north (where it lies, from +x towards +y), and clock-offset [s], added to
+                        the recording's clock to reach the log's, both counted from their first
+                        samples, or start (ISO 8601); sensor (a recipe of catalogs/sensors or a
+                        file) and zone, where the log does not state them; accept (the hash that
+                        confirms a drafted reading, as a refusal shows it)
 
 All values are SI and radians; toward-deg, north-deg and direction-sigma-deg are in degrees. What a
 recording's own description says may be left out. Paths are relative to the file.

@@ -200,7 +200,8 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
             raise UsageError(
                 "the log has directions, but where north lies in the recording is not said",
                 where=where,
-                fix="give north, the angle from +x towards +y, or the axis along which the air goes",
+                fix="give north, the angle from +x towards +y, or the axis along which the air "
+                "goes",
             )
         # The direction it comes from is clockwise from north, angles from +x are counter-clockwise.
         heading = placement.north - channels["wind_direction"] + math.pi
@@ -218,7 +219,8 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
             raise UsageError(
                 "the log has components in the sensor's axes, to which north says nothing",
                 where=where,
-                fix="leave north out and turn the recording into the sensor's axes, or give an axis",
+                fix="leave north out and turn the recording into the sensor's axes, or give an "
+                "axis",
             )
         return np.stack([channels.get(name, np.zeros(len(series))) for name in _COMPONENTS], axis=1)
     raise InputError(

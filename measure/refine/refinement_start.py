@@ -64,7 +64,8 @@ def summaries(estimator: Estimator, embedding: FloatArray) -> FloatArray:
     if not finite.any():
         return out
     rows = torch.from_numpy(embedding[finite]).to(estimator.device).float()
-    widths = [int(learner.network.dimension) for learner in estimator.learners]  # pyright: ignore[reportArgumentType]
+    networks = [learner.network for learner in estimator.learners]
+    widths = [int(one.dimension) for one in networks]  # pyright: ignore[reportArgumentType]
     means: list[Tensor] = []
     for learner, part in zip(estimator.learners, rows.split(widths, dim=1), strict=True):
         means.append(learner.mixture(part).mean() * learner.spread + learner.centre)

@@ -320,7 +320,8 @@ def _errors(verdict: Verdict) -> Section:
             "Root mean square one-step prediction error on data that "
             f"{'neither model was' if has_after else 'the model was not'} fitted to; intervals at "
             f"{level}. The floor is the model's error on data that were simulated from the model "
-            "itself with other numerics. Where errors lie above it, no effect brings them below it; "
+            "itself with other numerics. Where errors lie above it, no effect brings them below "
+            "it; "
             "where they lie below it, it limits nothing."
         ),
     ]

@@ -91,7 +91,8 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
     if test.settling is None:
         return (
             (
-                f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed "
+                f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be "
+                "needed "
                 "to decide."
             ),
         )
@@ -276,16 +277,19 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         ),
         logged,
         (
-            f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of "
+            f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at "
+            f"{which_frames} of "
             "the recordings"
         ),
         (
-            "area weight, bending and internal damping are calibrated, so that what only changes them "
+            "area weight, bending and internal damping are calibrated, so that what only changes "
+            "them "
             "is not an effect"
         ),
         between,
         (
-            f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its "
+            f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: "
+            "its "
             "interval says so"
         ),
         (

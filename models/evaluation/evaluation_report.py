@@ -135,7 +135,8 @@ def _sections(evaluation: Evaluation) -> Iterator[Section]:
     if (made := tables.differences(evaluation)) is not None:
         about = (
             f"The model's score less that of {evaluation.reference} on the same clips and the same "
-            "draws of sequences. An interval without zero is a difference beyond what the choice of "
+            "draws of sequences. An interval without zero is a difference beyond what the choice "
+            "of "
             "test sequences explains."
         )
         title = f"Against {evaluation.reference}, pair by pair"

@@ -60,7 +60,8 @@ def even(observation: Observation) -> Observation:
         raise InputError(
             f"the recording has {1 / step:.4g} frames a second",
             where=where,
-            fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer frames",
+            fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer "
+            "frames",
         )
     index = np.concatenate(
         [[0], np.cumsum(np.rint(np.diff(observation.times) / step).astype(np.int64))]

@@ -185,7 +185,8 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
     where = f"recording {recording.name!r}"
     if typical > _WILD * expected:
         raise InputError(
-            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about "
+            f"{expected:.3g}",
             where=where,
             fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions "
             "wrong?",
@@ -195,7 +196,8 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
     blows = _ratio(specimen, recording.wind) > _BLOWS
     if typical < max(_SLOW * expected * blows, _QUASI_STATIC * swing):
         raise InputError(
-            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about "
+            f"{expected:.3g}",
             where=where,
             fix=f"is the rate of {rate:.4g} Hz that of slow motion, or the unit of the wind "
             "another? Give the rate at "

@@ -1,4 +1,4 @@
-"""Questions that the numbers of wind columns raise: a gust's factor, and where the wind goes to or comes from."""
+"""Questions that wind columns raise: a gust's factor, and where the wind goes to or comes from."""
 
 from __future__ import annotations
 
