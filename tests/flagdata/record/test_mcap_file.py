@@ -66,8 +66,13 @@ def rows_of(payloads: message_payloads.Payloads) -> list[bytes]:
 
 def test_samples_in_bulk_are_protobufs_bytes() -> None:
     series = wind(400)
-    assert rows_of(message_payloads.samples(series, series.time, slice(0, 400))) == one_by_one(series)
-    assert rows_of(message_payloads.samples(series, series.time, slice(17, 40))) == one_by_one(series)[17:40]
+    assert rows_of(message_payloads.samples(series, series.time, slice(0, 400))) == one_by_one(
+        series
+    )
+    assert (
+        rows_of(message_payloads.samples(series, series.time, slice(17, 40)))
+        == one_by_one(series)[17:40]
+    )
 
 
 def test_a_host_clock_before_1970_is_protobufs_bytes() -> None:
