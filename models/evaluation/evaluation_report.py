@@ -20,6 +20,7 @@ from models.evaluation import evaluation_tables as tables
 from models.evaluation import paper, score_table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.evaluation import Evaluation, as_document
+from models.evaluation.evaluation_arrays import arrays_of
 from models.evaluation.predictive_calibration import BAND
 
 _COMMAND = "evaluate"
@@ -71,6 +72,7 @@ def answer_of(evaluation: Evaluation) -> Answer:
         sentence=_sentence(evaluation, quantities.get("rmse")),
         tone=Tone.SETTLED if _is_settled(evaluation) else Tone.OPEN,
         quantities=quantities,
+        arrays=arrays_of(evaluation),
         findings=evaluation.findings,
         document=as_document(evaluation),
         head=Head(

@@ -313,3 +313,17 @@ def test_the_answer_names_the_model_that_misses_the_wind_least_and_whether_that_
     assert (alike.tone, "which chance may explain" in alike.sentence) == (Tone.OPEN, True)
     alone = answer_of(evaluate([run("SDN", 0.3, 1)], data="made", seed=0, draws=50))
     assert alone.sentence == "SDN misses the wind by 0.254 m/s in the root mean square"
+
+
+def test_scores_are_a_data_set_over_models_targets_and_bins_of_the_wind(found: Evaluation) -> None:
+    pytest.importorskip("xarray", reason="xarray is not installed")
+    scores = answer_of(found).to_xarray()
+    assert list(scores["model"].values) == ["SDN", "ours <&>", "ResNet-18"]
+    assert float(scores["rmse"].sel(model="SDN")) == found.rows[0].scores["rmse"].value
+    assert scores["rmse"].attrs["units"] == "m/s"
+    low, high = scores["rmse_interval"].sel(model="SDN").values
+    assert (low, high) == found.rows[0].scores["rmse"].interval
+    assert math.isnan(float(scores["target_rmse"].sel(model="SDN", target="area_weight")))
+    first = found.wind_errors[0]
+    of_bin = scores["rmse_by_wind"].sel(model=first.label, wind=sum(first.bins[0].wind) / 2)
+    assert float(of_bin) == first.bins[0].rmse.value
