@@ -7,7 +7,7 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from flagdata.answer import Answer, Figure, Head, Section, Table
+from flagdata.answer import Answer, Array, Figure, Head, Section, Table
 from flagdata.answer.charts import Axis, Band, Chart, Colour, Dots, Line, Panel
 from flagdata.core.findings import Severity
 from flagdata.core.shell import command_line
@@ -36,6 +36,7 @@ def answer_of_reading(made: Made) -> Answer:
         sentence=_sentence(result),
         findings=result.findings,
         document={"anemometer": made.document},
+        arrays=_arrays(result),
         head=Head(
             figures=[_film(result), _both_winds(result)],
             facts=_facts(result),
@@ -85,6 +86,40 @@ def reading_section(result: ReadingCalibration) -> Section:
         anchor="anemometer",
         folded=True,
     )
+
+
+def _arrays(result: ReadingCalibration) -> dict[str, Array]:
+    """Returns winds (window,) in the order of time."""
+    model, half = result.model, result.half_width
+    read = model.winds - model.errors
+    names = np.repeat(
+        np.array([one.name for one in result.recordings]),
+        [one.windows for one in result.recordings],
+    )
+    starts = np.concatenate([one.features.starts[one.usable] for one in result.recordings])
+    network = np.concatenate([one.features.winds[one.usable] for one in result.recordings])
+    winds = {
+        "wind_speed": (read, "read of the window by a fit to all other blocks of time"),
+        "wind_speed_low": (np.maximum(read - half, 0.0), "lower end of its interval"),
+        "wind_speed_high": (read + half, "upper end of its interval"),
+        "wind_logged": (model.winds, "mean of the log over the window"),
+        "wind_of_network": (network, "read by the network alone"),
+    }
+    window = ("window",)
+    return {
+        "recording": Array(dimensions=window, values=names, coordinate=True),
+        "start": Array(
+            dimensions=window,
+            values=starts,
+            unit="s",
+            about="of the window, from the film's first frame",
+            coordinate=True,
+        ),
+        **{
+            name: Array(dimensions=window, values=values, unit="m/s", about=about)
+            for name, (values, about) in winds.items()
+        },
+    }
 
 
 def _sentence(result: ReadingCalibration) -> str:

@@ -10,7 +10,11 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.cloth.blown_wind import Log
     from measure.cloth.calibrate_call import folder_of, options_of, sources_of
-    from measure.cloth.calibration_answer import phrase_quantity, table_of_quantities
+    from measure.cloth.calibration_answer import (
+        arrays_of_draws,
+        phrase_quantity,
+        table_of_quantities,
+    )
     from measure.cloth.close_films import simulations_of
     from measure.cloth.cloth_calibration import Calibration, calibrate, quantity
     from measure.cloth.cloth_posterior import weigh_cloths

@@ -8,17 +8,20 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from flagdata.answer import Figure, Head, Section, Table, Tone
+from flagdata.answer import Array, Figure, Head, Section, Table, Tone
 from flagdata.answer.calibrated import Calibrated
 from flagdata.answer.charts import Chart, Colour
 from flagdata.answer.quantity import Quantity
+from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
 from flagdata.core.shell import command_line
 from flagdata.pages.page_pictures import moving
 from measure.cloth.cloth_calibration import Calibration, Fitted
 from measure.cloth.flag_prior import CLOTH
+from measure.cloth.flag_simulation import OBSERVED
 from measure.cloth.observables_chart import Predicted, chart_against_wind
 from measure.cloth.posterior_chart import posterior_panel
+from measure.observables import OBSERVABLES
 
 _SIDE = 300
 """Of the film on the page [px]."""
@@ -59,6 +62,7 @@ def answer_of_calibration(
         quantities=calibration.cloth,
         findings=calibration.findings,
         document={**calibration.document, **(further or {})},
+        arrays=_arrays(calibration),
         head=Head(
             figures=_head_figures(calibration),
             facts={**_facts(calibration), **(recorded or {})},
@@ -72,6 +76,68 @@ def answer_of_calibration(
         withheld=calibration.withheld,
         stated=calibration.area_weight_stated,
     )
+
+
+def _arrays(calibration: Calibration) -> dict[str, Array]:
+    """Returns draws (draw,), and readings and what simulated flags of the cloth show of them
+    (recording, window, observable), NaN beyond a recording's end."""
+    arrays = (
+        {} if calibration.withheld else arrays_of_draws(calibration.cloth, calibration.draws.cloth)
+    )
+    recordings = calibration.recordings
+    most = max(one.windows for one in recordings)
+
+    def stacked(several: Sequence[FloatArray]) -> FloatArray:
+        rows = [
+            np.pad(one, [(0, most - len(one)), *[(0, 0)] * (one.ndim - 1)], constant_values=np.nan)
+            for one in several
+        ]
+        return np.stack(rows)
+
+    windows = ("recording", "window")
+    observables = (*windows, "observable")
+    units = np.array([OBSERVABLES[name].unit for name in OBSERVED])
+    names = np.array([one.observed.name for one in recordings])
+    in_units = "in the unit of its observable"
+    parts = {
+        "reading": ([one.observed.readings for one in recordings], "of each window"),
+        "expected_low": ([one.low for one in recordings], "lower end of simulated flags"),
+        "expected": ([one.middle for one in recordings], "median of simulated flags"),
+        "expected_high": ([one.high for one in recordings], "upper end of simulated flags"),
+    }
+    return {
+        **arrays,
+        "recording": Array(dimensions=("recording",), values=names, coordinate=True),
+        "observable": Array(dimensions=("observable",), values=np.array(OBSERVED), coordinate=True),
+        "observable_unit": Array(dimensions=("observable",), values=units, coordinate=True),
+        "wind_speed": Array(
+            dimensions=windows,
+            values=stacked([one.observed.speed for one in recordings]),
+            unit="m/s",
+            about="mean of the log over the window",
+        ),
+        **{
+            name: Array(
+                dimensions=observables, values=stacked(several), about=f"{about}, {in_units}"
+            )
+            for name, (several, about) in parts.items()
+        },
+    }
+
+
+def arrays_of_draws(
+    quantities: Mapping[str, Quantity], draws: Mapping[str, FloatArray]
+) -> dict[str, Array]:
+    """Returns draws (draw,) of a joint posterior."""
+    return {
+        f"{name}_draws": Array(
+            dimensions=("draw",),
+            values=draws[name],
+            unit=one.unit,
+            about=f"draws of the posterior of the {name.replace('_', ' ')}",
+        )
+        for name, one in quantities.items()
+    }
 
 
 def _sentence(calibration: Calibration) -> str:

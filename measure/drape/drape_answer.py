@@ -24,6 +24,7 @@ from flagdata.ingest.meshes import read_obj
 from flagdata.recipes.typed_tables import Range, Scale
 from measure.cloth import (
     Uncertain,
+    arrays_of_draws,
     folder_of,
     phrase_quantity,
     posterior_panel,
@@ -213,6 +214,7 @@ def answer_of_drapes(found: Draped) -> Calibrated:
         quantities=found.cloth,
         findings=found.findings,
         document=json_values(found),
+        arrays=arrays_of_draws(found.cloth, found.draws),
         head=Head(
             figures=[
                 Figure(

@@ -383,3 +383,15 @@ def test_the_shares_are_those_of_films_by_another_renderer() -> None:
     sheet = json.loads((results / "validate-observables.json").read_text(encoding="utf-8"))
     found = share(vtk(sheet["result"]["films"]))
     assert found == pytest.approx(observed.LASTING, abs=0.006)
+
+
+def test_draws_windows_and_readings_are_a_data_set(plain: Calibration) -> None:
+    pytest.importorskip("xarray")
+    found = answer_of_calibration(plain).to_xarray()
+    assert found["area_weight_draws"].attrs["units"] == "kg/m²"
+    assert float(found["area_weight_draws"].median()) == pytest.approx(plain.weight.value)
+    droop = found["reading"].sel(observable="droop")
+    assert dict(droop.sizes) == {"recording": 1, "window": 48}
+    np.testing.assert_array_equal(droop[0], plain.recordings[0].observed.readings[:, 0])
+    assert str(droop["observable_unit"].item()) == "rad"
+    assert float(found["wind_speed"].mean()) == pytest.approx(plain.recordings[0].wind_speed)
