@@ -10,6 +10,6 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from flagdata.pages.graph import COLOURS
     from flagdata.pages.lineage_picture import picture
-    from flagdata.pages.page_pictures import figure_url, moving
+    from flagdata.pages.page_pictures import moving
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -1,36 +1,20 @@
-"""Pictures inside a page, as URLs that hold them: figures, frames, clips in motion."""
+"""Pictures inside a page, as URLs that hold them: frames, clips in motion."""
 
 from __future__ import annotations
 
 import base64
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
 from flagdata.core.arrays import UInt8Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 def data_url(data: bytes, media_type: str) -> str:
     """Writes the bytes as a URL that holds them."""
     return f"data:{media_type};base64,{base64.b64encode(data).decode('ascii')}"
-
-
-def png(figure: Figure, *, dpi: float = 110) -> bytes:
-    """Writes the figure as a PNG that does not name the program it was drawn by."""
-    target = io.BytesIO()
-    figure.savefig(target, format="png", dpi=dpi, metadata={"Software": None})
-    return target.getvalue()
-
-
-def figure_url(figure: Figure, *, dpi: float = 110) -> str:
-    """Writes the figure as a PNG in a data URL."""
-    return data_url(png(figure, dpi=dpi), "image/png")
 
 
 def still(frame: UInt8Array | Image.Image, *, side: int | None = None) -> str:
