@@ -22,6 +22,7 @@ from measure.report.error_maps import effect_chart, mean_shade, residual_chart, 
 from measure.report.lead_sentences import evidence, explained_words, lead, spoken
 from measure.report.moving_cloth import moving_figure
 from measure.report.recordings_chart import recording_chart
+from measure.report.verdict_arrays import arrays_of
 from measure.report.verdict_charts import errors_chart, gains_chart, strengths_chart, wind_chart
 from measure.report.verdict_sentences import list_names, readable, shorten_list
 from measure.report.verdict_words import words
@@ -96,6 +97,7 @@ def closed(
         sentence=spoken(verdict),
         tone=TONES[verdict.conclusion],
         quantities={**strengths, **parameters},
+        arrays=arrays_of(verdict),
         document=as_document(verdict),
         head=Head(
             figures=figures,
