@@ -263,8 +263,8 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(
         found = plain(made, options)
         return calibrate.Check(
             count=found.count,
-            contained=found.count * (options.simulations > 100),
-            error=found.error,
+            held=found.count * (options.simulations > 100),
+            median_error=found.median_error,
         )
 
     monkeypatch.setattr(calibrate, "check_coverage", checked)
