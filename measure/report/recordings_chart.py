@@ -17,7 +17,7 @@ def recording_chart(recording: Trajectory) -> Chart:
     stride = -(-len(recording.positions) // _COLUMNS)
     times = recording.times[::stride]
     positions = recording.positions[::stride]
-    seen = np.isfinite(positions).all(axis=2)
+    seen = np.asarray(np.isfinite(positions).all(axis=2))
     if recording.seen is not None:
         seen &= recording.seen[::stride]
     shown = np.where(seen[..., None], positions, np.nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +65,7 @@ def arrays_of(evaluation: Evaluation) -> dict[str, Array]:
 
 def _score(
     name: str,
-    scores: Mapping[tuple[object, ...], ScoreEstimate],
+    scores: Mapping[Any, ScoreEstimate],
     dimensions: Mapping[str, Sequence[object]],
     metric: str,
 ) -> dict[str, Array]:
