@@ -13,7 +13,7 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.closing.close import close_loop
-    from measure.closing.joint_answer import joint_answer
+    from measure.closing.answer_by_both import joint_answer
     from measure.closing.joint_verdict import join_verdicts
     from measure.closing.model_recipes import acting
     from measure.closing.verdict_artifacts import ClosedLoop, answer_of

@@ -17,7 +17,7 @@ from flagdata.core.console import document, echo_lines, in_steps, say
 from flagdata.core.files.outputs import write_files
 from flagdata.lake import Lake
 from flagdata.recipes.documents import to_toml
-from measure.closing.joint_answer import KINDS, joint_answer
+from measure.closing.answer_by_both import KINDS, joint_answer
 from measure.closing.joint_verdict import Joint
 from measure.closing.verdict_artifacts import ClosedLoop, keep
 from measure.report.document import plain

@@ -79,12 +79,13 @@ def test_recordings_are_brought_in_looked_at_and_handed_on_without_any_extra(lig
     assert (light["rows"], light["frames"], light["wind"]) == (2, 6, 2)
 
 
-def test_only_the_types_of_training_data_and_the_export_of_zarr_need_one(light: dict) -> None:
+def test_only_training_data_the_export_of_zarr_and_charts_need_one(light: dict) -> None:
     assert light["lacking"] == {
         "flagdata.dataset.loader": "torch",
         "flagdata.dataset.pairs": "torch",
         "flagdata.dataset.sample": "torch",
         "flagdata.export.zarr_groups": "xarray",
+        "flagdata.pages.chart_drawing": "matplotlib",
     }
 
 

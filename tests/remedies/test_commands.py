@@ -185,7 +185,7 @@ CASES = [
     Case(
         "export/export_plan.py",
         "try the filter with flagdata query",
-        "export csv --to out --where \"name = 'mist'\"",
+        "export csv --to out --where \"name like 'mi%'\"",
         ("query --where \"name like 'm%'\"", "export csv --to out --where \"name = 'mast'\""),
         shows="mast",
     ),

@@ -131,7 +131,7 @@ def test_an_erasure_that_was_killed_is_ended_by_gc_or_by_the_same_command(user: 
                 partial(lake.erase, [lake.artifact("first").id], "asked"),
                 at=0,
             )
-        user.meets("lake/health.py", "run flagdata gc, which d", "doctor")
+        user.meets("lake/removal_findings.py", "run flagdata gc, which d", "doctor")
         user.follows(*words)
         user.succeeds("doctor", shows="(?m)^healthy")
 
@@ -143,7 +143,7 @@ def test_an_expiry_that_was_killed_is_ended_by_gc(user: User) -> None:
     lake = the_lake(user)
     with pytest.MonkeyPatch.context() as patch:
         stopped(patch, Objects, "delete", partial(expire, lake, lake.catalog.head() - 1), at=0)
-    user.meets("lake/health.py", "what expired goes at once", "doctor")
+    user.meets("lake/removal_findings.py", "what expired goes at once", "doctor")
     user.follows("gc")
     assert not the_lake(user).objects.has(gone)
 

@@ -159,7 +159,7 @@ CASES = [
         files={"a.csv": HOBO.replace("GMT+00:00", "GMT-05:00")},
     ),
     Case(
-        "described.py",
+        "formats/recipe_headings.py",
         "give the one that was se",
         "ingest a.txt --zone UTC",
         ("ingest a.txt --zone UTC --unit km/h",),
@@ -389,7 +389,7 @@ def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: Use
         eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"])
     )
     fix = user.meets(
-        "formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC"
+        "formats/recipe_headings.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC"
     )
     (columns,) = re.findall(r"--columns '([^']*)'", fix)
     command = ("ingest", "a.csv", "--zone", "UTC", "--columns", columns, "--expect", "coarse")

@@ -205,7 +205,7 @@ def test_what_was_erased_is_left_out_of_an_export(user: User) -> None:
     gone = aligned(user)
     user.succeeds("tag", "v1")
     user.succeeds("withdraw", gone, "--everywhere", "-m", "a person asked")
-    user.meets("lake/health.py", "leave them out by --where", "doctor")
+    user.meets("lake/removal_findings.py", "leave them out by --where", "doctor")
     user.follows("export", "mcap", "--to", "out", "--at", "v1", "--where", "kind = 'camera'")
     user.meets(
         "lake/removal.py",

@@ -198,7 +198,7 @@ CASES = [
         untried="--sensor",
     ),
     Case(
-        "table/log_table.py",
+        "anemometer/log_reading.py",
         "leave out --azimuth; a turned vane",
         "ingest a.csv --azimuth 20",
         ("ingest a.csv",),
@@ -295,7 +295,7 @@ CASES = [
         files={"a.csv": BACK.replace("wind_speed", "wind_speed (m/s)")},
     ),
     Case(
-        "ingest/source_artifacts.py",
+        "ingest/artifacts_present.py",
         "or take the old one off with flagdata withdraw and ingest again",
         "ingest a.csv --name b",
         ("ingest a.csv", OR, "withdraw a -m name", "ingest a.csv --name b"),
@@ -303,7 +303,7 @@ CASES = [
         before=("ingest a.csv",),
     ),
     Case(
-        "ingest/source_artifacts.py",
+        "ingest/artifacts_present.py",
         "or take the old one off with flagdata withdraw and ingest again",
         "ingest a.csv --session b",
         ("ingest a.csv", OR, "withdraw a -m name", "ingest a.csv --session b"),
@@ -339,7 +339,7 @@ CASES = [
         files={"a.csv": ZONED},
     ),
     Case(
-        "formats/nmea.py",
+        "formats/stamped_nmea.py",
         "name another format by --as",
         "ingest a.nmea --as nmea-stamped",
         ("ingest a.nmea --as nmea",),
@@ -380,7 +380,7 @@ def test_a_draft_is_confirmed_by_the_hash_that_the_refusal_shows_or_described_by
 def test_the_direction_of_components_needs_an_azimuth(user: User) -> None:
     (user.folder / "a.csv").write_text(COMPONENTS)
     command = ("ingest", "a.csv", "--columns", "1=time,2=wind_x[m/s],3=wind_y[m/s]")
-    user.meets("table/log_table.py", "give the sensor's azimuth for a direction", *command)
+    user.meets("anemometer/log_reading.py", "give the sensor's azimuth for a direction", *command)
     user.again("--azimuth", 270)
 
 

@@ -140,7 +140,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "wrong bytes under right checksums: a damage is found by those before, with a remedy of its own": (
         ("flagdata/export/mcap.py", "run flagdata verify"),
-        ("flagdata/lake/mesh_sequences.py", "run flagdata verify; ing"),
+        ("flagdata/lake/marker_sequences.py", "run flagdata verify; ing"),
         ("flagdata/lake/mesh_sequences.py", "run flagdata verify; imp"),
         ("flagdata/record/messages.py", "run flagdata verify"),
         ("flagdata/record/reader.py", "run flagdata verify"),

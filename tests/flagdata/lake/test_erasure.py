@@ -61,7 +61,7 @@ def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike
     assert [note.kind for note in doctor(lake)] == ["withdrawn-collected"]
 
 
-def test_what_was_erased_and_what_gc_took_are_told_apart_where_older_versions_show_both(
+def test_what_was_erased_and_what_gc_took_differ_where_older_versions_show_both(
     lake: Lake,
 ) -> None:
     film, other = put_text(lake, "film"), put_text(lake, "other")

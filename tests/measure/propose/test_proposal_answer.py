@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flagdata.answer.answer import Tone
-from measure.propose.outcome import (
+from flagdata.answer import Tone
+from measure.propose import (
     Decision,
     PeriodogramLine,
     ProposalOutcome,
