@@ -138,6 +138,10 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "what nobody foresaw cannot be provoked; tests/contract has --debug": (
         ("flagdata/core/console.py", "this is a defect of flag"),
     ),
+    "a page's advice for the next film, no remedy; tests/measure/cloth and anemometer read it": (
+        ("measure/anemometer/reading_answer.py", "For other films of it: <"),
+        ("measure/cloth/calibration_answer.py", "For <code>flagdata measu"),
+    ),
     "wrong bytes under right checksums: a damage is found by those before, with a remedy of its own": (
         ("flagdata/export/mcap.py", "run flagdata verify"),
         ("flagdata/lake/marker_sequences.py", "run flagdata verify; ing"),
