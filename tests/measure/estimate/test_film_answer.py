@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.answer import Bound, Quantity, Span
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
 from measure.estimate import information
@@ -100,10 +101,10 @@ def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_t
 
 
 def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> None:
-    document = json.loads(json.dumps(STRONG.as_dict(), allow_nan=False))
+    document = json.loads(json.dumps(json_values(STRONG), allow_nan=False))
     assert (document["value"], document["sigma"], document["interval"]) == (None, None, [9.4, None])
     assert (document["bound"], document["level"]) == ("at-least", 0.95)
-    assert (WIND.as_dict()["bound"], WIND.as_dict()["level"]) == (None, 0.9)
+    assert (json_values(WIND)["bound"], json_values(WIND)["level"]) == (None, 0.9)
 
 
 def test_draws_at_both_ends_of_the_range_give_no_value() -> None:

@@ -241,15 +241,15 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
     found = measured(film, ambiguous)
     (finding,) = [one for one in found.bounds if one.kind == "weight-open"]
     nowhere: Any = SimpleNamespace(known=None)
+    nothing_else: Any = SimpleNamespace(elsewhere=None)
     series = beside(found, start=None, wind=None)
     _report(
         _Done(
             measured=found,
             series=series,
-            artifact=None,
             subject=nowhere,
             refinement=None,
-            elsewhere=None,
+            answer=nothing_else,
         ),
         series=False,
     )

@@ -243,7 +243,7 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     }
     for kind in ("markers", "films"):
         assert (out / kind / "report.html").exists()
-        assert f'href="{kind}/report.html"' in (out / "report.html").read_text()
+        assert f'id="{kind}-test"' in (out / "report.html").read_text()
     kept = Lake.open(lake).rows({"kind": "measurement"}).num_rows
     assert kept == 2
 
