@@ -82,6 +82,11 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
 }
 _LEGEND_COLUMNS = 4
+_PLACES = re.compile(r'\b(?:d|x|y)="[^"]*"')
+_DIGITS = re.compile(r"(\d\.\d\d)\d+")
+"""Digits beyond a hundredth of a point, of which an inch has 72."""
+_DOTS = re.compile(r'<use ([^>]*) style="([^"]*)"/>\n(?:<use [^>]* style="\2"/>\n)+')
+"""Dots of one style, which states it for each."""
 _HANDLE, _LETTER = 0.5, 0.066
 """What an entry of a legend takes beside its text, and a letter of it [inch]."""
 _NARROW = 6.0
@@ -105,12 +110,21 @@ def svg(chart: Chart, *, name: str, title: str = "") -> Markup:
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     head, tail = text.split(">", 1)
     text = re.sub(r' (width|height|version|xmlns[^=]*)="[^"]*"', "", head) + ">" + tail
+    text = _PLACES.sub(lambda places: _DIGITS.sub(r"\1", places[0]), text)
+    text = _DOTS.sub(_group_dots, re.sub(r"\n\s+", "\n", text))
     text = re.sub(r"(\bid=\"|url\(#|href=\"#)", rf"\g<1>{name}-", text)
     for colour, value in _VALUES.items():
         text = text.replace(value, f"var(--{colour.value}, {value})")
     kind = Markup(' class="wide"') if chart.width > _NARROW else ""
     about = Markup('<svg role="img" aria-label="{}"{}').format(title, kind)
     return about + Markup(text.removeprefix("<svg"))
+
+
+def _group_dots(dots: re.Match[str]) -> str:
+    """States the style of dots once, for all of them."""
+    style = dots[2]
+    alone = dots[0].replace(f' style="{style}"', "").replace("xlink:href", "href")
+    return f'<g style="{style}">\n{alone}</g>\n'
 
 
 def png(chart: Chart, *, dpi: float = 110) -> bytes:
