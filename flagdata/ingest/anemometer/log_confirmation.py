@@ -93,6 +93,7 @@ class UnconfirmedError(RefusedError):
     """A reading that the program drafted, and that nobody has confirmed."""
 
     kind = ErrorKind.UNCONFIRMED
+    JSON_NAMES = (*RefusedError.JSON_NAMES, "accept", "preview")
 
     def __init__(
         self, what: str, *, where: str | None = None, fix: str, accept: str = "", preview: str = ""

@@ -48,7 +48,7 @@ try:
         import pathlib
         tx.add(Artifact(kind="wind", name="x", object=tx.put(pathlib.Path(sys.argv[3]))))
 except FlagdataError as error:
-    print(json_values(error)["what"], "|", error.fix)
+    print(error.what, "|", error.fix)
 """
 
 
