@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.closing.close import close_loop
     from measure.closing.answer_by_both import joint_answer
+    from measure.closing.close import close_loop
     from measure.closing.joint_verdict import join_verdicts
     from measure.closing.model_recipes import acting
     from measure.closing.verdict_artifacts import ClosedLoop, answer_of

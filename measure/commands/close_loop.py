@@ -204,8 +204,8 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     """
     from flagdata.core.files.outputs import check_files
     from flagdata.dataset.lake_source import lake_of
-    from measure.closing.close import close_loop as close
     from measure.closing.answer_by_both import KINDS
+    from measure.closing.close import close_loop as close
     from measure.closing.model_recipes import models
     from measure.closing.verdict_artifacts import answer_of
     from measure.closing.verdict_output import FILES, JOINT, Delivery, deliver, deliver_joint

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from flagdata.answer.closed import Closed
-from measure.closing import join_verdicts, joint_answer, spoken
+from measure.closing import join_verdicts, joint_answer
+from measure.closing.answer_by_both import spoken
 from measure.closing.joint_verdict import Joint, _multiply_likelihoods
 from measure.report import answer_of_markers
 from measure.report.document import plain

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flagdata.answer import Tone
-from measure.propose import (
-    Decision,
+from measure.propose import Decision, ProposalOutcome
+from measure.propose.outcome import (
     PeriodogramLine,
-    ProposalOutcome,
     Ranked,
     Retest,
     StrengthCourse,
