@@ -271,11 +271,10 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         where = ", ".join(
             f"{name} {value}" for name, value in chosen_by.items() if value is not None
         )
-        written = request.where if isinstance(request.where, str) else None
         raise NotFoundError(
             "no rows match",
             where=where,
-            fix=unknown_value(written, catalog) or "try the filter with flagdata query",
+            fix=unknown_value(request.where, catalog) or "try the filter with flagdata query",
         )
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():

@@ -1,4 +1,4 @@
-"""Draws charts: as SVG that takes its colours from the page, as PNG, or as the file of a picture.
+"""Draws charts: as SVG that takes its colours from the page, or as the file of a picture.
 
 The one place that knows matplotlib.
 """
@@ -125,14 +125,6 @@ def _group_dots(dots: re.Match[str]) -> str:
     style = dots[2]
     alone = dots[0].replace(f' style="{style}"', "").replace("xlink:href", "href")
     return f'<g style="{style}">\n{alone}</g>\n'
-
-
-def png(chart: Chart, *, dpi: float = 110) -> bytes:
-    """Draws a chart as a PNG that does not name the program it was drawn by."""
-    target = io.BytesIO()
-    with mpl.rc_context(_STYLE):
-        _draw(chart).savefig(target, format="png", dpi=dpi, metadata={"Software": None})
-    return target.getvalue()
 
 
 def encode(chart: Chart, path: Path) -> bytes:

@@ -19,9 +19,8 @@ def render(
 ) -> str:
     """Renders the page that `template` of `package` makes of `values`.
 
-    Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or
-    script of theirs. Values are escaped unless they are `Markup`; a name the template uses and
-    `values` lacks is an error.
+    Templates extend "base.html.j2" and may use `filters`. Values are escaped unless they are
+    `Markup`; a name the template uses and `values` lacks is an error.
     """
     environment = Environment(
         autoescape=True,
@@ -32,7 +31,6 @@ def render(
     )
     environment.filters.update(filters or {})
     environment.globals["base_style"] = Markup(text_of("flagdata.pages", "base.css"))
-    environment.globals["asset"] = lambda name: Markup(text_of(package, name))
     return environment.get_template(template).render(**values)
 
 
