@@ -12,10 +12,6 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
 from flagdata.core.rng import stream
 from flagdata.errors import UsageError
-from measure.anemometer.intervals import half_width, mean_errors
-from measure.anemometer.novelty import Compared
-from measure.anemometer.reading_model import ReadingModel
-from measure.anemometer.window_features import Features, features_of
 from measure.estimate.combine import Dependence
 from measure.estimate.film_answer import LEAST_INFORMATION, information
 from measure.estimate.film_measuring import Measurement
@@ -25,6 +21,10 @@ from measure.film.conditioned_film import ConditionedFilm
 from measure.film.similarity import FlagSize, Sizes, trained_on
 from measure.gate.gate_verdict import Reason, Verdict
 from measure.gate.reasons import REASONS
+from measure.measuring_model.intervals import half_width, mean_errors
+from measure.measuring_model.novelty import Compared
+from measure.measuring_model.reading_model import ReadingModel
+from measure.measuring_model.window_features import Features, features_of
 from measure.posterior_ends import limits_of
 from models.trained.estimator import Estimator
 

@@ -22,7 +22,6 @@ from flagdata.core.workload import one_thread
 from flagdata.errors import InputError
 from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.results import Placed
-from measure.anemometer.networks import CALIBRATED, network
 from measure.anemometer.reading_calibration import (
     ANSWER,
     ENOUGH,
@@ -32,11 +31,12 @@ from measure.anemometer.reading_calibration import (
     calibrate_reading,
     windows_of_recording,
 )
-from measure.anemometer.reading_model_folder import write
-from measure.anemometer.window_features import VERSION
 from measure.cloth.observed_recording import usable
 from measure.film.film_source import FilmReading, Subject, subjects
 from measure.film.similarity import FlagSize
+from measure.measuring_model.networks import CALIBRATED, network
+from measure.measuring_model.reading_model_folder import write
+from measure.measuring_model.window_features import VERSION
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 

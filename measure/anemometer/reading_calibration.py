@@ -14,22 +14,22 @@ from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.findings import Finding
 from flagdata.errors import InputError, RefusedError
 from flagdata.record.signals import Sensor
-from measure.anemometer.intervals import half_width
-from measure.anemometer.networks import Network
-from measure.anemometer.novelty import Familiar
-from measure.anemometer.reading_model import ReadingModel
-from measure.anemometer.regression import (
+from measure.cloth.blown_wind import STEADY, Log
+from measure.film.film_source import Subject
+from measure.film.similarity import FlagSize
+from measure.gate.reasons import REASONS
+from measure.measuring_model.intervals import half_width
+from measure.measuring_model.networks import Network
+from measure.measuring_model.novelty import Familiar
+from measure.measuring_model.reading_model import ReadingModel
+from measure.measuring_model.regression import (
     BLOCK,
     Ridge,
     blocks_of,
     validate_penalties,
     with_neighbours,
 )
-from measure.anemometer.window_features import SUMMARY, Features, features_of
-from measure.cloth.blown_wind import STEADY, Log
-from measure.film.film_source import Subject
-from measure.film.similarity import FlagSize
-from measure.gate.reasons import REASONS
+from measure.measuring_model.window_features import SUMMARY, Features, features_of
 
 ANSWER = 1
 """Raised when the same recordings give another reading model."""

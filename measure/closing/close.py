@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from measure.forecasting.setting import Stage
 from measure.loop.run import LoopOptions, solve
-from measure.observe.trajectory import Experiment
 from measure.report.verdict_statement import with_sentences
+from measure.trajectories.trajectory import Experiment
 from measure.verdict.verdict_record import Verdict
 
 
@@ -18,7 +18,7 @@ def close_loop(
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked
-            at before).
+        InputError: recordings that cannot be used (see `measure.trajectories.checks` for what is
+            looked at before).
     """
     return with_sentences(solve(experiment, options, stage=stage))

@@ -19,9 +19,9 @@ from measure.closing.close import close_loop
 from measure.closing.verdict_findings import check_findings, with_warnings
 from measure.loop.run import LoopOptions
 from measure.nulls.null_plan import FEWEST_NULLS
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
-from measure.observe.mesh_observations import from_sequence
 from measure.report.verdict_answer import answer_of_markers
+from measure.trajectories import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
+from measure.trajectories.mesh_observations import from_sequence
 from measure.verdict.criteria import CRITERIA
 from sim.cloth.material import MATERIALS, named_material
 

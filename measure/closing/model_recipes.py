@@ -16,7 +16,7 @@ import numpy as np
 
 from measure.forecasting.alignment import align_experiment
 from measure.forecasting.regressors import SHAPES
-from measure.observe.trajectory import Experiment, Specimen
+from measure.trajectories.trajectory import Experiment, Specimen
 from measure.verdict.verdict_record import Candidate, Conclusion, Verdict
 from sim.cloth import handles
 from sim.cloth.air import AIR_FORCES, AirForce

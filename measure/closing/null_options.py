@@ -15,7 +15,7 @@ from measure.closing.verdict_findings import check_findings, finding_text
 
 if TYPE_CHECKING:
     from measure.forecasting.setting import Stage
-    from measure.observe.experiment_recipe import ExperimentRecipe
+    from measure.trajectories.experiment_recipe import ExperimentRecipe
 
 
 def nulls_given(

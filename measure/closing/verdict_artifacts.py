@@ -27,10 +27,10 @@ from flagdata.lake.results import Placed
 from measure.closing.model_recipes import NamedModel, acting
 from measure.loop.run import LoopOptions
 from measure.nulls.bank import files
-from measure.observe import Experiment
-from measure.observe.trajectory import describe_cloth
 from measure.report.document import as_document, from_document
 from measure.report.verdict_answer import answer_of_markers
+from measure.trajectories import Experiment
+from measure.trajectories.trajectory import describe_cloth
 from measure.verdict.verdict_record import Candidate, Verdict
 
 _FORMAT = 1

@@ -17,9 +17,14 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.log_confirmation import UNASKED, Confirm
 from flagdata.lake import Lake
-from measure.observe import Observation, Up
-from measure.observe.experiment_recipe import RecordingSource, WindSource, blown, open_recordings
-from measure.observe.wind_tracks import LogPlacement
+from measure.trajectories import Observation, Up
+from measure.trajectories.experiment_recipe import (
+    RecordingSource,
+    WindSource,
+    blown,
+    open_recordings,
+)
+from measure.trajectories.wind_tracks import LogPlacement
 
 Recorded = TypeVar("Recorded", bound="_Recording")
 _HERE = Path()
@@ -141,7 +146,7 @@ def draft_recordings(
     folder: Path,
 ) -> dict[str, Any]:
     """Returns what a recipe says of the recordings of some sources, see
-    `measure.observe.experiment_recipe`.
+    `measure.trajectories.experiment_recipe`.
 
     Args:
         folder: of the recipe, which its paths are relative to.

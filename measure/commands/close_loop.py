@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from flagdata.lake import Lake
     from measure.closing.verdict_artifacts import ClosedLoop
     from measure.closing.verdict_sources import SourceOptions
-    from measure.observe import Hold, Setup, Up
-    from measure.observe.experiment_recipe import ExperimentRecipe
+    from measure.trajectories import Hold, Setup, Up
+    from measure.trajectories.experiment_recipe import ExperimentRecipe
     from sim.cloth.material import Material
 
 MARKERS, WIND = "Markers and meshes", "The wind beside markers"
@@ -214,8 +214,8 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from measure.forecasting.strengths import Suspicion, on_markers
     from measure.loop.run import LoopOptions
     from measure.nulls.null_workload import of_recordings
-    from measure.observe import Setup, observe
-    from measure.observe import experiment_recipe as recipes
+    from measure.trajectories import Setup, observe
+    from measure.trajectories import experiment_recipe as recipes
 
     recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
@@ -391,7 +391,7 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
     from flagdata.core.files.outputs import write_file
     from flagdata.recipes.documents import to_toml
     from measure.closing.verdict_sources import draft_recordings, filled_entries
-    from measure.observe import Setup
+    from measure.trajectories import Setup
 
     if chosen.recipe is not None or chosen.draft is None or not sources:
         raise UsageError(
@@ -468,7 +468,7 @@ def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
 
 
 def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
-    from measure.observe import Up
+    from measure.trajectories import Up
 
     if recipe is not None and "up" not in typed_names(chosen):
         return recipe.up
@@ -479,7 +479,7 @@ def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
 
 def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Setup:
     """Replaces what the command line states in a setup."""
-    from measure.observe import sheet
+    from measure.trajectories import sheet
     from sim.cloth.material import MATERIALS, named_material
 
     if chosen.material is not None:
@@ -502,7 +502,7 @@ def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Se
 
 
 def _held(text: str) -> Hold | tuple[tuple[float, float], ...]:
-    from measure.observe import Hold
+    from measure.trajectories import Hold
 
     try:
         return Hold(text)

@@ -33,12 +33,12 @@ from flagdata.verbs.verb_options import AsJson, argument, command, option, optio
 if TYPE_CHECKING:
     from flagdata.answer.measured import Measured
     from flagdata.lake import Lake
-    from measure.anemometer.networks import Network
     from measure.commands.measure_film import Request
     from measure.estimate.film_measuring import Measurement
     from measure.estimate.nearest import Neighbour
     from measure.estimate.wind_by_window import Beside
     from measure.film.film_source import Subject
+    from measure.measuring_model.networks import Network
     from measure.refine.refinement import Refinement
 
 
@@ -120,9 +120,9 @@ def measure(chosen: MeasureCommand) -> None:
         check_folder(chosen.zarr)
     if chosen.source is not None and chosen.lake is None:
         check_without_lake(chosen.source)
-    from measure.anemometer.networks import network
     from measure.commands.measure_film import Request
     from measure.film.film_source import subjects
+    from measure.measuring_model.networks import network
 
     lake, at = chosen.opened(), chosen.version
     request = Request.of(chosen, lake=lake, at=at, refine=chosen.refine)

@@ -23,7 +23,6 @@ from flagdata.ingest.films.film_array import Frames
 from flagdata.lake import Lake
 from flagdata.timebase import NANOSECONDS
 from measure.anemometer.anemometer_measuring import measure_by
-from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.combine import of_model
 from measure.estimate.film_answer import SHORT, say
 from measure.estimate.film_measuring import Measurement, Options, measure
@@ -31,6 +30,7 @@ from measure.estimate.measurement_page import FindNeighbours, make_head, make_se
 from measure.estimate.named_cloth import weight_of
 from measure.estimate.wind_by_window import Beside, beside
 from measure.film.film_source import FilmReading, Subject, size_of, subjects
+from measure.measuring_model.networks import Network, gate_beside, network
 from measure.refine.refinement import Refinement
 from measure.refine.refinement_section import refinement_section
 

@@ -22,11 +22,11 @@ from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.mesh_sequences import check_format, read_part, store_errors, write_plain
 from flagdata.lake.results import Placed
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer.networks import Network
 from measure.estimate.film_measuring import Measurement
 from measure.estimate.gusty_series import SERIES_KEY
 from measure.estimate.wind_by_window import WIND, Beside
 from measure.film.film_source import FilmReading, Subject
+from measure.measuring_model.networks import Network
 
 _FORMAT = 1
 _ANSWER = 4

@@ -32,11 +32,11 @@ def propose(chosen: Proposing) -> Iterator[Result]:
     from flagdata.dataset.lake_source import lake_of
     from measure.nulls.null_plan import NullOptions
     from measure.nulls.null_workload import of_recordings
-    from measure.observe import experiment_recipe as recipes
     from measure.propose import candidates, effect_file, proposal_log
     from measure.propose.proposal_answer import answer_of
     from measure.propose.term_search import propose as seek
     from measure.propose.terms import dictionary
+    from measure.trajectories import experiment_recipe as recipes
 
     folder = Path(chosen.out) / "proposal"
     proposal_log.check(folder / "proposals.json")

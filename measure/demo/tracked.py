@@ -18,7 +18,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from measure.observe.interpolation import onto
+from measure.trajectories.interpolation import onto
 from sim.cloth import handles
 from sim.cloth.handles import Handles
 from sim.cloth.material import named_material

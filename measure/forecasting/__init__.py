@@ -1,7 +1,7 @@
 """The problem: an experiment made ready, the model of its cloth, the regressors it may differ
 along, its forecasts.
 
-It may import `measure.observe` and the simulator, and no other stage of a verdict.
+It may import `measure.trajectories` and the simulator, and no other stage of a verdict.
 """
 
 from __future__ import annotations

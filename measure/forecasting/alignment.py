@@ -9,7 +9,7 @@ import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
-from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from measure.trajectories.trajectory import Experiment, Specimen, Trajectory
 
 _CALM = 0.3
 """Wind below which the flag, not the log, says where the wind goes [m/s]."""

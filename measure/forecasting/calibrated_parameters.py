@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.core.arrays import FloatArray
-from measure.observe.trajectory import AREA_WEIGHT_UNCERTAINTY
+from measure.trajectories.trajectory import AREA_WEIGHT_UNCERTAINTY
 from sim.cloth.material import Material
 
 

@@ -32,8 +32,8 @@ from flagdata.errors import UsageError
 from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.forecasting.regressors import DOUBLE, Column, StepColumn, WrittenColumn
 from measure.forecasting.segments import Segments
-from measure.observe.interpolation import onto
-from measure.observe.trajectory import Specimen
+from measure.trajectories.interpolation import onto
+from measure.trajectories.trajectory import Specimen
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
 from sim.cloth.scene import Scene, assemble

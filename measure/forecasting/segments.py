@@ -14,7 +14,7 @@ import numpy as np
 
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
-from measure.observe.trajectory import Trajectory, WindTrack
+from measure.trajectories.trajectory import Trajectory, WindTrack
 
 HORIZON = 0.04
 """How far ahead a prediction reaches, about [s]: 25 frames a second, the paper's rate."""
@@ -132,7 +132,7 @@ class Segments:
                 raise InputError(
                     "a marker was lost in some frames",
                     where=f"recording {recording.name!r}",
-                    fix="fill its gaps (measure.observe.fill)",
+                    fix="fill its gaps (measure.trajectories.fill)",
                 )
             frames = recording.positions[:: cut.stride]
             tracked = None if recording.seen is None else recording.seen[:: cut.stride]

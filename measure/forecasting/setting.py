@@ -12,7 +12,7 @@ from measure.forecasting.alignment import align_experiment
 from measure.forecasting.calibrated_parameters import PRIOR_WITHOUT_MASS, Calibration, prior
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Experiment
+from measure.trajectories.trajectory import Experiment
 from sim.integrate.split import SplitEuler
 
 Stage = Callable[[str, int, int], object]

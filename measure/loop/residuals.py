@@ -8,7 +8,7 @@ from scipy.signal import welch
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from measure.forecasting.segments import Segments
 from measure.loop.validation import Predictions
-from measure.observe.trajectory import Experiment
+from measure.trajectories.trajectory import Experiment
 from measure.verdict.verdict_record import Residual
 
 _SHOWN = 50

@@ -60,12 +60,12 @@ from measure.nulls.conformal import kinds_needed
 from measure.nulls.free_run import settled_off
 from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank, Reference
-from measure.observe.checks.attachment import hoist_stands_still
-from measure.observe.trajectory import Experiment
 from measure.probes.lines import SpectralLine
 from measure.probes.statistics import Projection, Statistics, projected_statistics
 from measure.probes.wind_course import Variation
 from measure.probes.wind_log import lags
+from measure.trajectories.checks.attachment import hoist_stands_still
+from measure.trajectories.trajectory import Experiment
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.verdict_record import (
@@ -148,8 +148,8 @@ def solve(
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked
-            at before).
+        InputError: recordings that cannot be used (see `measure.trajectories.checks` for what is
+            looked at before).
     """
     began = time.perf_counter()
     torch.set_num_threads(1)

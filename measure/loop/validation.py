@@ -24,7 +24,7 @@ from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import Refined, finish_step
 from measure.nulls import tracks, winds
 from measure.nulls.null_simulation import NullBatch
-from measure.observe.attachment_anchors import as_seen
+from measure.trajectories.attachment_anchors import as_seen
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.verdict_record import Comparison, Estimate
 

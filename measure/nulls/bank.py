@@ -34,10 +34,10 @@ from measure.nulls import stiffness
 from measure.nulls.free_run import mistaken, settled_off
 from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank
-from measure.observe.attachment_anchors import as_seen
-from measure.observe.trajectory import Specimen, Trajectory
 from measure.probes.statistics import Statistics, statistics
 from measure.probes.wind_course import Course
+from measure.trajectories.attachment_anchors import as_seen
+from measure.trajectories.trajectory import Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 from sim.workers import connect_workers
 

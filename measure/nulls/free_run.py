@@ -12,8 +12,8 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import child_seed, stream
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.nulls.null_simulation import NullBatch
-from measure.observe.trajectory import Trajectory
 from measure.probes.settled import settling_of
+from measure.trajectories.trajectory import Trajectory
 from measure.verdict.criteria import CRITERIA
 
 _COPIES = 2

@@ -16,7 +16,7 @@ from measure.nulls import tracks, winds
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank
-from measure.observe.trajectory import describe_cloth
+from measure.trajectories.trajectory import describe_cloth
 from measure.verdict.criteria import CRITERIA
 
 _CARRIED = ", carried along the recordings' own ways from other instants on"

@@ -20,9 +20,9 @@ from flagdata.core.rng import stream
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.nulls.stiffness import StiffnessFactors
-from measure.observe.attachment_anchors import carry_attachments
-from measure.observe.interpolation import onto
-from measure.observe.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
+from measure.trajectories.attachment_anchors import carry_attachments
+from measure.trajectories.interpolation import onto
+from measure.trajectories.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
 from sim.cloth.mesh import Diagonals, Mesh, grid

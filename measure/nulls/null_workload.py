@@ -9,7 +9,7 @@ from measure.forecasting.segments import Cut
 from measure.nulls import bank as banks
 from measure.nulls.null_plan import NullOptions
 from measure.nulls.null_simulation import SETTLE, NullBatch
-from measure.observe.trajectory import Trajectory
+from measure.trajectories.trajectory import Trajectory
 
 _PACE = 400.0
 """Vertices of the fitted mesh times seconds of one null recording that one core simulates, and

@@ -19,8 +19,8 @@ from scipy.linalg import solveh_banded
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from measure.nulls.null_simulation import CARRIED, SETTLE
-from measure.observe.interpolation import onto
-from measure.observe.trajectory import AttachmentTrack, Trajectory
+from measure.trajectories.interpolation import onto
+from measure.trajectories.trajectory import AttachmentTrack, Trajectory
 
 _TURN = 1.0
 """In which a way that ends slows down and turns back [s], so that it has no jump of its

@@ -14,7 +14,7 @@ import numpy as np
 
 from flagdata.core.rng import stream
 from measure.nulls.null_simulation import SETTLE
-from measure.observe.trajectory import Trajectory, WindTrack
+from measure.trajectories.trajectory import Trajectory, WindTrack
 
 _STEADY = 1e-3
 """Fluctuation below which a wind counts as steady, as a share of its mean [1]."""

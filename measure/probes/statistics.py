@@ -39,12 +39,12 @@ from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, winds
 from measure.forecasting.segments import Segments
-from measure.observe.interpolation import onto
-from measure.observe.trajectory import Specimen
 from measure.probes.lines import Spectrum
 from measure.probes.segment_rows import StatisticRows
 from measure.probes.wind_course import Course, Gauge
 from measure.probes.wind_log import sensitivities
+from measure.trajectories.interpolation import onto
+from measure.trajectories.trajectory import Specimen
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -23,8 +23,8 @@ from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
-from measure.observe.trajectory import WindTrack
 from measure.probes.wind_course import ALONG, Course
+from measure.trajectories.trajectory import WindTrack
 
 NUISANCES, DIRECTION = 3, 1
 """How many there are for each recording, and the place of the direction among them."""

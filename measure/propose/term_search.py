@@ -46,7 +46,6 @@ from measure.loop.validation import (
 )
 from measure.nulls import null_plan
 from measure.nulls.reference import NullBank
-from measure.observe.trajectory import Experiment
 from measure.probes.statistics import Statistics
 from measure.propose.family import Family
 from measure.propose.outcome import Decision, ProposalOutcome, Ranked, Retest, TermStrength
@@ -54,6 +53,7 @@ from measure.propose.projected import ProjectedSegments, evidence
 from measure.propose.regressor_course import course
 from measure.propose.search import Step, search, wrong
 from measure.propose.terms import MASS, TermColumn
+from measure.trajectories.trajectory import Experiment
 from sim.effects.field import Flat
 
 _FLOOR_COPIES = 2

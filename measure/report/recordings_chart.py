@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flagdata.answer.charts import Axis, Cells, Chart, Colour, Line, Panel
-from measure.observe.trajectory import Trajectory
+from measure.trajectories.trajectory import Trajectory
 
 _COLUMNS = 600
 """Instants that are drawn at most."""

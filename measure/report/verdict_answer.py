@@ -13,7 +13,6 @@ from markupsafe import Markup
 from flagdata.answer import Bound, Quantity, Span
 from flagdata.answer.answer import Cell, Figure, Head, Part, Section, Table, Tone
 from flagdata.answer.closed import Closed
-from measure.observe.trajectory import Experiment
 from measure.report import verdict_cells as cells
 from measure.report import verdict_sections as sections
 from measure.report import verdict_sentences
@@ -26,6 +25,7 @@ from measure.report.verdict_arrays import arrays_of
 from measure.report.verdict_charts import errors_chart, gains_chart, strengths_chart, wind_chart
 from measure.report.verdict_sentences import list_names, readable, shorten_list
 from measure.report.verdict_words import words
+from measure.trajectories.trajectory import Experiment
 from measure.verdict import quantity
 from measure.verdict.quantity import number, probability
 from measure.verdict.verdict_record import Conclusion, Estimate, Residual, Verdict

@@ -15,11 +15,11 @@ from measure.loop.corrective_field import Mode
 from measure.loop.run import LoopOutcome
 from measure.nulls import bank as banks
 from measure.nulls.conformal import MOST_KINDS
-from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.lines import STROUHAL, SpectralLine
 from measure.probes.wind_course import ALONG, LEFT, Variation
 from measure.report.lead_sentences import lead
 from measure.report.verdict_sentences import list_names
+from measure.trajectories.trajectory import Experiment, Specimen
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number, with_error
 from measure.verdict.verdict_record import Conclusion, NullTest, Verdict

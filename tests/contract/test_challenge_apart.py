@@ -11,7 +11,7 @@ from tests.contract.imports import PACKAGES, ROOT, imported_from, modules
 FITTING = (
     "sim",
     "models",
-    "measure/observe",
+    "measure/trajectories",
     "measure/verdict",
     "measure/forecasting",
     "measure/probes",

@@ -92,7 +92,7 @@ def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_command
         "zarr",
     )
     code = (
-        "import sys\nfrom measure.anemometer import network\n"
+        "import sys\nfrom measure.measuring_model import network\n"
         "from measure.commands import measure, measurement_artifact\n"
         "from measure.estimate import film_measuring as measuring, wind_by_window as series\n"
         "network(None, lake=None, at=None)\n"

@@ -77,7 +77,7 @@ ALLOWED = {
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; "
     "batches by put_if_absent",
     "measure/cloth/calibration_artifact.py": LAKE,
-    "measure/anemometer/reading_model_folder.py": LAKE,
+    "measure/measuring_model/reading_model_folder.py": LAKE,
     "measure/cloth/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever "
     "folder it is in",
     "sim/compiler.py": "flagdata's own cache folder",

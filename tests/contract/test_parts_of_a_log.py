@@ -101,7 +101,8 @@ def test_a_log_that_names_its_format_enters_few_files(tmp_path: Path) -> None:
     finally:
         sys.setprofile(None)
     assert len(log.series) == 40
-    # Opening a log is a module of its own: beside the text's it would import the containers, which import the text's.
+    # Opening a log is a module of its own: beside the text's it would import the containers, which
+    # import the text's.
     assert len([name for name in entered if Path(name).is_relative_to(HOUSE)]) <= 24
     formats = {Path(name).stem for name in entered if Path(name).is_relative_to(HOUSE / "formats")}
     assert formats <= {"described", "recipe_headings", "toa5"}

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from tests.contract.imports import ROOT, imported_from, imported_names, modules, tree
 
 STAGES = (
-    "observe",
+    "trajectories",
     "verdict",
     "forecasting",
     "probes",
@@ -20,7 +20,7 @@ STAGES = (
     "propose",
 )
 """Each may import those before it."""
-BARE = {"verdict": set[str](), "observe": set[str]()}
+BARE = {"verdict": set[str](), "trajectories": set[str]()}
 """Stages that import no other one."""
 
 

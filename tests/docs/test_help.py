@@ -1,5 +1,5 @@
-"""`help` of a public call shows what it takes: a signature, a kind for each argument, and the unit of
-each number."""
+"""`help` of a public call shows what it takes: a signature, a kind for each argument, and the unit
+of each number."""
 
 from __future__ import annotations
 

@@ -22,14 +22,14 @@ from flagdata.lake import Lake, MeshSequence
 from measure.demo import TrackedRecipe, make_tracks
 from measure.nulls import NullBatch
 from measure.nulls.bank import build
-from measure.observe import Experiment, load
 from measure.propose import Decision, ProposalOutcome
 from measure.propose.proposal_log import entries
+from measure.trajectories import Experiment, load
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.cloth.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
-from tests.measure.observe.flags import HEIGHT, WIDTH, flutter
 from tests.measure.report.verdicts import Size, verdict
+from tests.measure.trajectories.flags import HEIGHT, WIDTH, flutter
 
 SPEEDS = (4.0, 6.0)
 

@@ -1,4 +1,5 @@
-"""What notebooks, pages and examples import is public: it is the same in an installation, and stays.
+"""What notebooks, pages and examples import is public: it is the same in an installation, and
+stays.
 
 The docstring of `flagdata` names the public modules."""
 

@@ -18,14 +18,14 @@ from flagdata.recipes.retired_names import KEYS, NAMES
 
 ROOT = Path(flagdata.__file__).parent.parent
 PRODUCT = ("flagdata", "sim", "models", "measure")
-RECIPES = ("sim/run/simulation_toml.py", "measure/observe/experiment_recipe.py")
+RECIPES = ("sim/run/simulation_toml.py", "measure/trajectories/experiment_recipe.py")
 """Modules whose dataclasses and tables are the keys of recipes."""
 RETIRED = {*NAMES, *KEYS, "density_uncertainty", "density-uncertainty"}
 OF_THE_AIR = {
-    "measure/observe/checks/inertia_check.py",
-    "measure/observe/checks/surroundings.py",
-    "measure/observe/describing.py",
-    "measure/observe/experiment_recipe.py",
+    "measure/trajectories/checks/inertia_check.py",
+    "measure/trajectories/checks/surroundings.py",
+    "measure/trajectories/describing.py",
+    "measure/trajectories/experiment_recipe.py",
     "measure/report/verdict_statement.py",
     "sim/cloth/air.py",
     "sim/run/cusick_drape.py",
@@ -55,8 +55,8 @@ OF_THE_LAST_VERSION = {
     "measure/cloth/film_options.py",
     "measure/commands/close_loop.py",
     "measure/nulls/null_plan.py",  # a hash
-    "measure/observe/experiment_recipe.py",
-    "measure/observe/trajectory.py",  # a hash
+    "measure/trajectories/experiment_recipe.py",
+    "measure/trajectories/trajectory.py",  # a hash
 }
 """Modules that read names of the last version, or hash under them."""
 

@@ -24,6 +24,7 @@ VERBS = {
         "measure/commands/measure",
         "measure/gate",
         "measure/anemometer",
+        "measure/measuring_model",
         "measure/refine",
     ),
     "observe": ("measure/observables", "measure/film", "measure/commands/observe"),
@@ -31,6 +32,7 @@ VERBS = {
         "measure/cloth",
         "measure/commands/calibrate",
         "measure/anemometer",
+        "measure/measuring_model",
         "measure/observables",
         "measure/film",
         "measure/estimate",
@@ -44,7 +46,7 @@ VERBS = {
     "close-loop": (
         "measure/closing",
         "measure/commands/close_loop",
-        "measure/observe",
+        "measure/trajectories",
         "measure/cloth",
     ),
 }
@@ -89,7 +91,7 @@ def test_every_reason_of_the_gate_is_on_the_page_and_no_other() -> None:
     assert shown[: len(REASONS)] == list(REASONS)
     assert set(shown) == {*REASONS, *WINDOWS, *CALIBRATED}
     for kind in CALIBRATED:
-        assert f'"{kind}"' in (ROOT / "measure" / "anemometer" / "novelty.py").read_text(
+        assert f'"{kind}"' in (ROOT / "measure" / "measuring_model" / "novelty.py").read_text(
             encoding="utf-8"
         ), kind
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from measure.forecasting import Calibration, Forecaster, Segments
-from measure.observe import Specimen, Trajectory, WindTrack
+from measure.trajectories import Specimen, Trajectory, WindTrack
 from sim.cloth import handles
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid

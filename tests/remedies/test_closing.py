@@ -61,19 +61,19 @@ def test_options_of_a_log_are_left_out_where_none_is(user: User, cloth: str) -> 
 
 def test_what_is_not_known_of_a_cloth_is_named(user: User, cloth: str) -> None:
     command: tuple[str, ...] = ("close-loop", cloth)
-    user.meets("observe/experiment.py", "give its velocity, or an", *command, *PINS, *MATERIAL)
+    user.meets("trajectories/experiment.py", "give its velocity, or an", *command, *PINS, *MATERIAL)
     user.again("--wind", 5, *AXIS, code=3, shows=BEGINS)
     command = (*command, "--wind", "5", *AXIS)
-    user.meets("observe/experiment.py", ", or their rest coordina", *command, *MATERIAL)
+    user.meets("trajectories/experiment.py", ", or their rest coordina", *command, *MATERIAL)
     user.again(*PINS, code=3, shows=BEGINS)
-    user.meets("observe/experiment.py", "name one of the catalog", *command, *PINS)
+    user.meets("trajectories/experiment.py", "name one of the catalog", *command, *PINS)
     user.again(*MATERIAL, code=3, shows=BEGINS)
 
 
 def test_what_is_no_mesh_sequence_is_one_that_is_listed(user: User, cloth: str) -> None:
     rest = ("--wind", 5, *AXIS, *PINS, *MATERIAL)
     user.meets(
-        "observe/mesh_observations.py", "name a mesh sequence; fl", "close-loop", "mast", *rest
+        "trajectories/mesh_observations.py", "name a mesh sequence; fl", "close-loop", "mast", *rest
     )
     user.follows("ls", shows=f"meshes +{cloth}")
     ended = user.types("close-loop", cloth, *rest)
@@ -84,7 +84,7 @@ def test_a_weight_is_stated_once_with_its_uncertainty(user: User, cloth: str) ->
     command = ("close-loop", cloth, *PINS, "--wind", 5, *AXIS)
     weight = ("--area-weight", "0.155±0.003")
     user.meets(
-        "observe/setup.py",
+        "trajectories/setup.py",
         "leave it out: --area-wei",
         *command,
         *MATERIAL,

@@ -95,7 +95,7 @@ def test_a_film_is_read_by_the_model_that_was_calibrated(
     )
     user.again(without="--flag-size", shows=READ)
     shown(monkeypatch, seed=1, where=place(seed=9))
-    user.meets("anemometer/novelty.py", "calibrate this flag from", *command)
+    user.meets("measuring_model/novelty.py", "calibrate this flag from", *command)
     user.leaves(["--model"])
     user.succeeds("withdraw", "garden", "-m", "another flag", "--with-descendants")
     user.follows(*CALIBRATE, "yard")

@@ -20,8 +20,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "off": (
         ("measure/anemometer/reading_calibration.py", "align the film with the"),
         ("measure/anemometer/reading_calibration.py", "check the clocks with fl"),
-        ("measure/anemometer/window_features.py", "choose another part by -"),
-        ("measure/anemometer/window_features.py", "give another film, or --"),
+        ("measure/measuring_model/window_features.py", "choose another part by -"),
+        ("measure/measuring_model/window_features.py", "give another film, or --"),
     ),
     "a film whose stamps have gaps in every window, yet at least one window long": (
         ("measure/estimate/film_measuring.py", "frames are missing or rep"),
@@ -51,7 +51,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/lake/refs.py", "run flagdata verify; "),
     ),
     "a log that a reader accepts for its other channels, beside a film of markers": (
-        ("measure/observe/wind_tracks.py", "see what flagdata ingest"),
+        ("measure/trajectories/wind_tracks.py", "see what flagdata ingest"),
     ),
     "a record without frames or wind that stands as a row: no command commits one": (
         ("flagdata/export/lerobot.py", "leave it out by --where"),
@@ -125,7 +125,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/align/cloth_recording.py", "name a camera artifact;"),
         ("flagdata/align/windpair.py", "flagdata align REFERENCE"),
         ("flagdata/api/recordings.py", "; look at them with flag"),
-        ("measure/observe/markers.py", "name a marker artifact;"),
+        ("measure/trajectories/markers.py", "name a marker artifact;"),
     ),
     "said to a browser, by a page; tests/flagdata/view opens the addresses": (
         ("flagdata/view/server.py", "open the whole address t"),
@@ -151,7 +151,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/record/salvage.py", "run `flagdata recover` o"),
         ("flagdata/record/video_archive.py", "run flagdata verify"),
         ("flagdata/view/media.py", "run flagdata verify"),
-        ("measure/anemometer/reading_model_folder.py", "run flagdata verify; cal"),
+        ("measure/measuring_model/reading_model_folder.py", "run flagdata verify; cal"),
         ("measure/closing/verdict_artifacts.py", "run flagdata verify; clo"),
         ("measure/commands/measurement_artifact.py", "run flagdata verify; mea"),
     ),

@@ -1,4 +1,5 @@
-"""A quantity in words: its value, its bound, or what was assumed of it, each with its level once."""
+"""A quantity in words: its value, its bound, or what was assumed of it, each with its level
+once."""
 
 from __future__ import annotations
 

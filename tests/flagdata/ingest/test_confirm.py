@@ -29,7 +29,7 @@ from flagdata.ingest import (
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.record.signals import WindLog
-from measure.observe import LogPlacement, from_log
+from measure.trajectories import LogPlacement, from_log
 from tests.confirming import CONFIRMED
 from tests.program import Run, invoke
 

@@ -12,9 +12,10 @@ from scipy.signal import lfilter
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.record.signals import Sensor
-from measure.anemometer import Features, Place, ReadingCalibration, Recording, calibrate_reading
+from measure.anemometer import ReadingCalibration, Recording, calibrate_reading
 from measure.cloth import Log
 from measure.film import FlagSize, WindowLayout
+from measure.measuring_model import Features, Place
 
 SIZE = FlagSize(length=1.5, height=1.0)
 STEP = 1.2

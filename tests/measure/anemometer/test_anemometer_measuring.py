@@ -16,11 +16,12 @@ from flagdata.core.findings import Finding, Severity
 from flagdata.core.json_values import json_values
 from flagdata.core.stated import Stated
 from flagdata.errors import CorruptError, UsageError
-from measure.anemometer import Features, Place, ReadingCalibration, anemometer_measuring
-from measure.anemometer.novelty import Compared
-from measure.anemometer.reading_model_folder import read, write
+from measure.anemometer import ReadingCalibration, anemometer_measuring
 from measure.estimate import Measurement, Options, beside
 from measure.film import FlagSize
+from measure.measuring_model import Features, Place
+from measure.measuring_model.novelty import Compared
+from measure.measuring_model.reading_model_folder import read, write
 from models.networks.targets import TARGETS
 from tests.measure.anemometer.made import SIZE, STEP, features, gusts, model, place
 

@@ -17,9 +17,10 @@ from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
 from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer import anemometer_measuring, making, network, reading_calibration
+from measure.anemometer import anemometer_measuring, making, reading_calibration
 from measure.commands.calibrate import calibrate
 from measure.commands.measure import measure
+from measure.measuring_model import network
 from tests.golden_answers import changes
 from tests.measure.anemometer.made import features, gusts, place
 
@@ -125,7 +126,7 @@ def test_a_model_whose_network_has_changed_is_refused(
 ) -> None:
     given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")
     assert _run(calibrate, *given).exit_code == 0
-    monkeypatch.setattr("measure.anemometer.networks.file_hash", lambda _: "another")
+    monkeypatch.setattr("measure.measuring_model.networks.file_hash", lambda _: "another")
     with pytest.raises(InputError, match="is another one"):
         network("monday-anemometer", lake=Lake.open(lake), at=None)
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, RefusedError
-from measure.anemometer.intervals import half_width, mean_errors
-from measure.anemometer.regression import Ridge, blocks_of, validate_penalties, with_neighbours
 from measure.cloth import Log
+from measure.measuring_model.intervals import half_width, mean_errors
+from measure.measuring_model.regression import Ridge, blocks_of, validate_penalties, with_neighbours
 from tests.measure.anemometer.made import STEP, features, gusts, model, recording, slow
 
 _RNG = np.random.default_rng(3)

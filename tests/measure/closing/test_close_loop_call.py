@@ -14,7 +14,7 @@ from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import MeshSequence
 from measure.closing import close_loop_call
 from measure.loop import LoopOptions
-from measure.observe import Experiment
+from measure.trajectories import Experiment
 from measure.verdict import Conclusion, Verdict
 from tests.measure.report.verdicts import verdict
 

@@ -23,10 +23,10 @@ from measure.closing.verdict_sources import read
 from measure.commands import CloseLoopCommand
 from measure.commands.close_loop import _setup as setup_of
 from measure.commands.close_loop import with_warnings
-from measure.observe import Setup, Up, parse
+from measure.trajectories import Setup, Up, parse
 from measure.verdict import Conclusion
-from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import Size, verdict
+from tests.measure.trajectories.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.program import invoke
 
 

@@ -22,7 +22,7 @@ from measure.closing import ClosedLoop, acting, answer_of
 from measure.closing.model_recipes import models
 from measure.closing.verdict_artifacts import fingerprint, keep, read
 from measure.loop import LoopOptions
-from measure.observe import Experiment, Specimen, Trajectory, WindTrack
+from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh

@@ -11,7 +11,7 @@ import pytest
 from flagdata.errors import InputError
 from measure.demo import TrackedRecipe, make_tracks
 from measure.demo.tracked import Tracks
-from measure.observe import load, read
+from measure.trajectories import load, read
 from sim.effects import EFFECTS
 
 RECIPE = TrackedRecipe(seed=5, speeds=(4.0, 6.0), duration=5.0, settle=0.4)

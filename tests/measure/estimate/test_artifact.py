@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from measure.anemometer import Network
 from measure.commands import read
 from measure.commands.measurement_artifact import artifact, write
 from measure.estimate import beside
 from measure.film import ConditionedFilm, FilmReading, Subject
+from measure.measuring_model import Network
 from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_film_measuring import far, measured

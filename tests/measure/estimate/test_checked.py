@@ -6,8 +6,8 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from measure.anemometer import gate_beside, network
 from measure.gate import CheckedGate, FamiliarityGate, write
+from measure.measuring_model import gate_beside, network
 from tests.measure.gate.made import learned
 
 

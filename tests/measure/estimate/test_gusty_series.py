@@ -16,7 +16,6 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, InputError
-from measure.anemometer import network
 from measure.estimate import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
 from measure.estimate.gusty_series import (
     Course,
@@ -25,6 +24,7 @@ from measure.estimate.gusty_series import (
     gust_covariance,
     log_moments,
 )
+from measure.measuring_model import network
 from models.trained.estimator import Estimator
 from models.trained.model_folder import CARD, card_bytes, read_card, renew
 

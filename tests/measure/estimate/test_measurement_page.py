@@ -17,12 +17,12 @@ from flagdata.errors import RefusedError
 from flagdata.ingest.films.film_array import Frames
 from flagdata.record.signals import WindAverage
 from flagdata.timebase import parse
-from measure.anemometer import Network
 from measure.commands.measure_film import Request, answer_of
 from measure.estimate import Measurement, beside, make_head, make_sections, winds
 from measure.estimate.measurement_page import FindNeighbours
 from measure.estimate.nearest import Neighbour
 from measure.film import ConditionedFilm, FilmReading, Subject
+from measure.measuring_model import Network
 from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even, pictures
 from tests.measure.estimate.test_film_measuring import far, measured

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.forecasting import align_experiment
-from measure.observe import Experiment, Specimen, Trajectory, WindTrack
+from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 
 
 def turned(points: np.ndarray, angle: float) -> np.ndarray:

@@ -25,9 +25,9 @@ from measure.forecasting import (
 )
 from measure.forecasting import model as model_module
 from measure.forecasting.regressors import MotionColumn
-from measure.observe import Specimen, Trajectory, WindTrack
 from measure.probes import Projection, reduce_errors
 from measure.propose import Term, columns_of
+from measure.trajectories import Specimen, Trajectory, WindTrack
 from sim.cloth import handles
 from sim.integrate import JointBatch
 

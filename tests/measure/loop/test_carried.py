@@ -15,7 +15,7 @@ from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
 from measure.nulls import SETTLE, NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.observe import (
+from measure.trajectories import (
     AttachmentTrack,
     Experiment,
     Hold,

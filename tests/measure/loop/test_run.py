@@ -25,10 +25,10 @@ from measure.loop import LoopOptions, run
 from measure.loop.corrective_field import corrective_field
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks
-from measure.observe import Experiment, Specimen, Trajectory
 from measure.probes import projected_statistics
 from measure.report import as_document, from_document, lead
 from measure.report.verdict_words import words
+from measure.trajectories import Experiment, Specimen, Trajectory
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength

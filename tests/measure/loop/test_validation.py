@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from measure.forecasting import Segments
 from measure.loop import folds, paired_difference, total_error
-from measure.observe import Specimen, Trajectory, WindTrack
+from measure.trajectories import Specimen, Trajectory, WindTrack
 
 RNG = np.random.default_rng(1)
 NOISE = RNG.standard_normal(12)

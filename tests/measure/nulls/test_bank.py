@@ -10,8 +10,8 @@ import pytest
 
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
 from measure.nulls import NullBatch, evaluate
-from measure.observe import Specimen, as_seen
 from measure.probes.statistics import statistics
+from measure.trajectories import Specimen, as_seen
 from sim.integrate import SplitEuler
 
 LEAN = EffectColumn(effect="tilted-pole", parameter="lean", step=0.02)

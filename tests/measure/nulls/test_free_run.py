@@ -11,7 +11,7 @@ import pytest
 
 from flagdata.core.arrays import FloatArray
 from measure.nulls.free_run import settled_off
-from measure.observe import Trajectory, WindTrack
+from measure.trajectories import Trajectory, WindTrack
 
 MARKERS = np.stack(
     np.meshgrid(np.linspace(0.0, 1.5, 7), np.linspace(0.0, 1.0, 5)), axis=-1

@@ -13,7 +13,7 @@ import pytest
 from measure.forecasting import Setting
 from measure.nulls import GroupedConformal, NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.observe import Experiment, Specimen, Trajectory
+from measure.trajectories import Experiment, Specimen, Trajectory
 
 
 @pytest.fixture

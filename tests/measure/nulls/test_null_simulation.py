@@ -11,7 +11,7 @@ import pytest
 from flagdata.errors import FlagdataError
 from measure.forecasting import Calibration
 from measure.nulls import NullBatch, StiffnessFactors
-from measure.observe import AttachmentTrack, Specimen, WindTrack
+from measure.trajectories import AttachmentTrack, Specimen, WindTrack
 from sim.cloth import handles
 from sim.effects import VerticalWind
 from sim.run.simulation_loop import DivergedError

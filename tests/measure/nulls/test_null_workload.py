@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from measure.nulls import FEWEST_NULLS, NullOptions, of_recordings
-from measure.observe import Trajectory, WindTrack
+from measure.trajectories import Trajectory, WindTrack
 
 
 def recording(seconds: float) -> Trajectory:

@@ -11,7 +11,7 @@ import pytest
 from flagdata.core.arrays import FloatArray
 from measure.nulls import SETTLE, tracks
 from measure.nulls.null_simulation import CARRIED
-from measure.observe import Trajectory, WindTrack, carry_attachments
+from measure.trajectories import Trajectory, WindTrack, carry_attachments
 
 RATE, SECONDS, FAR, FREQUENCY = 25.0, 8.0, 0.15, 0.7
 MARKERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4], [0.4, 0.4]])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from measure.nulls import SETTLE, winds
-from measure.observe import Trajectory, WindTrack
+from measure.trajectories import Trajectory, WindTrack
 
 SPEEDS = (3.0, 4.5, 6.0, 7.5)  # m/s
 DURATION = 6.0  # s

@@ -8,9 +8,9 @@ import torch
 
 from flagdata.core.rng import stream
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
-from measure.observe import Trajectory
 from measure.probes import projected_statistics
 from measure.probes.statistics import PoleMoment, shares, statistics
+from measure.trajectories import Trajectory
 
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)
 

@@ -10,9 +10,9 @@ import torch
 
 from flagdata.errors import UsageError
 from measure.forecasting import AcrossColumn, Calibration, EffectColumn, Forecaster, Segments
-from measure.observe import Trajectory
 from measure.probes import Statistics, projected_statistics
 from measure.probes.statistics import statistics
+from measure.trajectories import Trajectory
 
 COLUMNS = (
     EffectColumn(effect="lift", parameter="coefficient", step=0.3),

@@ -13,10 +13,10 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.errors import UsageError
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments, winds
-from measure.observe import Trajectory, WindTrack
 from measure.probes import ALONG, LEFT, Course, Statistics, error_scale, projected_statistics
 from measure.probes.statistics import statistics
 from measure.probes.wind_course import Gauge
+from measure.trajectories import Trajectory, WindTrack
 from sim.wind import VonKarman
 
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)

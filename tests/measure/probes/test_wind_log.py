@@ -13,9 +13,9 @@ from flagdata.core.arrays import FloatArray
 from measure.forecasting import THETA, Calibration, Cut, Forecaster, Segments, library
 from measure.forecasting.segments import Segment
 from measure.inference import Evidence, NullModel
-from measure.observe import Trajectory, WindTrack
 from measure.probes import Course, Statistics, by_recording, lags, projected_statistics
 from measure.probes.wind_log import misread
+from measure.trajectories import Trajectory, WindTrack
 
 COLUMNS = (next(c for c in library() if c.name == "lift.coefficient"),)
 COUNT = len(THETA) + len(COLUMNS)

@@ -16,8 +16,8 @@ from flagdata.core.rng import stream
 from measure.forecasting import THETA, Calibration, Column, EffectColumn, fields
 from measure.inference import Nulls
 from measure.nulls import NullBank, NullBatch, evaluate
-from measure.observe import Experiment, Specimen
 from measure.propose import Term, columns_of
+from measure.trajectories import Experiment, Specimen
 from sim.cloth import Cloth
 from sim.effects import Effect, ForceEffect, Value, strength
 

@@ -14,9 +14,9 @@ import pytest
 import flagdata
 from flagdata.errors import InputError
 from measure.nulls import NullOptions, of_recordings
-from measure.observe import Experiment
-from measure.observe import experiment_recipe as recipes
 from measure.propose import Decision, ProposalOutcome, term_search
+from measure.trajectories import Experiment
+from measure.trajectories import experiment_recipe as recipes
 from tests.program import invoke
 
 

@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from measure.forecasting import THETA, Calibration, Column, Forecaster, Segments
-from measure.observe import Experiment
 from measure.probes.statistics import statistics
 from measure.propose import Term, columns_of, made_ready
 from measure.propose.projected import ProjectedSegments, of_columns
+from measure.trajectories import Experiment
 
 TERMS = columns_of(
     [

@@ -12,9 +12,9 @@ import pytest
 
 from flagdata.errors import CorruptError, InputError
 from measure.forecasting import Segments
-from measure.observe import Trajectory, WindTrack
 from measure.propose import Decision, ProposalOutcome, proposal_log
 from measure.propose.term_search import data_hash, split
+from measure.trajectories import Trajectory, WindTrack
 from tests.golden_answers import changes
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])

@@ -12,11 +12,11 @@ import torch
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import Column, EffectColumn
 from measure.nulls import NullBank, NullOptions
-from measure.observe import Experiment, Specimen, WindTrack
 from measure.propose import Decision, ProposalOutcome, made_ready, write
 from measure.propose.outcome import Retest
 from measure.propose.proposal_words import words
 from measure.propose.term_search import weigh
+from measure.trajectories import Experiment, Specimen, WindTrack
 from measure.verdict import Estimate
 from sim.cloth.scene import assemble, flag
 from sim.effects import FieldEffect, Seen, load

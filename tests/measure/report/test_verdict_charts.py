@@ -10,10 +10,10 @@ import pytest
 
 from flagdata.answer.charts import Across, Bars, Bins, Cells, Line, Mark
 from flagdata.pages.chart_drawing import svg
-from measure.observe import Trajectory, WindTrack
 from measure.report.error_maps import effect_chart
 from measure.report.recordings_chart import recording_chart
 from measure.report.verdict_charts import errors_chart, gains_chart, null_chart
+from measure.trajectories import Trajectory, WindTrack
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
 

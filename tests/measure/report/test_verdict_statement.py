@@ -9,10 +9,10 @@ import pytest
 
 from measure.forecasting import Calibration, FieldColumn
 from measure.loop import LoopOutcome, Mode
-from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.probes import SpectralLine, Variation
 from measure.report import by_draw, lead, with_sentences
 from measure.report.verdict_statement import assumptions, blowing, bounds, proposal, shedding
+from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
 

@@ -16,7 +16,7 @@ from flagdata.answer.simulated import Simulated
 from flagdata.errors import LimitError, UnknownNameError, UsageError
 from flagdata.ingest import read_folder
 from flagdata.lake import Lake, RaggedMeshSequence, read_meshes
-from measure.observe import from_sequence
+from measure.trajectories import from_sequence
 from sim.cloth.limits import StrainLimits
 from sim.cloth.sizing import Remeshing
 from sim.render import Meshes

@@ -24,9 +24,9 @@ import numpy as np
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.rng import child_seed
 from flagdata.ingest.films.film import Film
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import FilmReading, FlagSize, subjects
+from measure.measuring_model import Network, gate_beside, network
 from measure.refine import Clip
 from measure.refine import run as refine
 from tests.studies.long_films import simulated

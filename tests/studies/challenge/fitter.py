@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from measure.observe import Experiment
+from measure.trajectories import Experiment
 from measure.verdict import CRITERIA, Verdict
 from tests.studies.challenge.films import Filmed
 

@@ -26,7 +26,7 @@ from flagdata.core.provenance import canonical, digest, file_hash
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.recipes.documents import read_json
 from flagdata.recipes.shelves import is_name
-from measure.observe import Experiment, Specimen, Trajectory, WindTrack, as_seen
+from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack, as_seen
 from sim.cloth.handles import corners
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid

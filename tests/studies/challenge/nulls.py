@@ -18,8 +18,8 @@ from flagdata.recipes.documents import read_json
 from measure.forecasting import Cut, Setting
 from measure.nulls import NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.observe import Specimen
-from measure.observe import experiment_recipe as recipes
+from measure.trajectories import Specimen
+from measure.trajectories import experiment_recipe as recipes
 from sim.cloth import handles
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid

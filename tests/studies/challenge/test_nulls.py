@@ -17,7 +17,7 @@ from flagdata.errors import ConflictError, InputError, UsageError
 from measure.forecasting import Cut
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks
-from measure.observe import Experiment, Specimen, Trajectory
+from measure.trajectories import Experiment, Specimen, Trajectory
 from tests.studies.challenge import nulls
 from tests.studies.challenge.cases import TINY
 from tests.studies.challenge.command import challenge

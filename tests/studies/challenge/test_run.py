@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, InputError, RefusedError, UnknownNameError
-from measure.observe import Experiment
+from measure.trajectories import Experiment
 from measure.verdict import Conclusion, Verdict
 from tests.pausing import finding_tests
 from tests.studies.challenge import cases

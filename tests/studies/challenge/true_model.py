@@ -11,7 +11,7 @@ import torch
 
 from measure.forecasting import Calibration, Setting
 from measure.loop import folds
-from measure.observe import Experiment
+from measure.trajectories import Experiment
 from sim.effects import Effect, Gusts, apply
 from tests.studies.challenge.answer_key import AnswerKey
 from tests.studies.challenge.folder import ChallengeFolder

@@ -27,10 +27,10 @@ from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
 from measure.nulls import NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.observe import Specimen
-from measure.observe import experiment_recipe as recipes
 from measure.propose import dictionary
 from measure.propose.term_search import propose
+from measure.trajectories import Specimen
+from measure.trajectories import experiment_recipe as recipes
 from sim.cloth import handles
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid

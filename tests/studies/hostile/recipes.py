@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from flagdata.ingest.anemometer.sensor_recipe import parse as parse_sensor
 from flagdata.recipes.shelves import parse_recipe
-from measure.observe import load as load_experiment
+from measure.trajectories import load as load_experiment
 from models.training import parse as parse_training
 from sim.arcsim import read_material, read_scene
 from sim.cloth.material import Material

@@ -25,12 +25,13 @@ import torch
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
 from flagdata.lake import Lake
-from measure.anemometer import Features, Network, Recording, calibrate_reading, network
+from measure.anemometer import Recording, calibrate_reading
 from measure.anemometer.anemometer_measuring import measured_from
-from measure.anemometer.window_features import features_of
 from measure.cloth import Log
 from measure.estimate import Measurement, Options, beside
 from measure.film import FilmReading, FlagSize, Subject, subjects
+from measure.measuring_model import Features, Network, network
+from measure.measuring_model.window_features import features_of
 from sim.datasets import Cast, load
 from sim.datasets.anemometer import air
 from sim.run import Crew

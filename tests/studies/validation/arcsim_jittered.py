@@ -33,7 +33,7 @@ from measure.forecasting import Setting
 from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.nulls import batches
-from measure.observe import (
+from measure.trajectories import (
     AREA_WEIGHT_UNCERTAINTY,
     Experiment,
     Hold,

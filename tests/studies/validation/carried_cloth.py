@@ -26,7 +26,7 @@ from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
 from measure.nulls import NullBatch, null_plan, tracks
 from measure.nulls import bank as banks
-from measure.observe import (
+from measure.trajectories import (
     Experiment,
     Hold,
     Observation,

@@ -21,10 +21,10 @@ import torch
 
 from flagdata.core.stated import Stated
 from flagdata.errors import FlagdataError, NotFoundError
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Measurement, Options, measure, of_model
 from measure.film import FilmReading, FlagSize, subjects
 from measure.gate import REASONS, WindowGate
+from measure.measuring_model import Network, gate_beside, network
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.shares import Share
 from tests.studies.validation.environments import VTK

@@ -31,7 +31,7 @@ from measure.closing import close_loop
 from measure.forecasting import Segments
 from measure.loop import LoopOptions
 from measure.nulls import bank as banks
-from measure.observe import Observed, load, read
+from measure.trajectories import Observed, load, read
 from measure.verdict import NOT_REJECTED, Conclusion, Estimate
 from tests.studies.challenge.classes import class_of
 from tests.studies.shares import Share

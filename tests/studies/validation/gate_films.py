@@ -17,10 +17,10 @@ from typing import Any
 import torch
 
 from flagdata.errors import NotFoundError
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options
 from measure.film import FlagSize
 from measure.gate import WindowGate
+from measure.measuring_model import Network, gate_beside, network
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.shares import Share
 from tests.studies.validation.environments import VTK

@@ -22,10 +22,10 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.stated import Stated
 from flagdata.ingest.films.film_array import Frames
-from measure.anemometer import gate_beside, network
 from measure.estimate import DRAWS, FilmAnswer, Measurement, Options, measure, of_model
 from measure.estimate.film_posterior import WEIGHT, WIND
 from measure.film import FlagSize
+from measure.measuring_model import gate_beside, network
 from models.trained.estimator import Estimator
 from models.trained.restriction import Known
 from tests.studies.long_films import LongFilm, simulated

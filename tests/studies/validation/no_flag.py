@@ -23,10 +23,10 @@ from flagdata.core.arrays import UInt8Array
 from flagdata.core.rng import stream
 from flagdata.errors import RefusedError
 from flagdata.ingest.films.film_array import Frames
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import ConditionedFilm, FlagSize
 from measure.gate import WindowGate
+from measure.measuring_model import Network, gate_beside, network
 from sim.assets import Assets
 from sim.datasets.camera_picture import noisy
 from tests.drawn import no_flag

@@ -41,7 +41,7 @@ from measure.forecasting import Setting
 from measure.loop import LoopOptions, solve
 from measure.nulls import NullBatch, StiffnessFactors, batches
 from measure.nulls import bank as banks
-from measure.observe import (
+from measure.trajectories import (
     Experiment,
     Hold,
     Observation,

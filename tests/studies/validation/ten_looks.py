@@ -28,10 +28,10 @@ from flagdata.core.arrays import UInt8Array
 from flagdata.core.rng import child_seed
 from flagdata.core.stated import Stated
 from flagdata.lake import MeshSequence, RaggedMeshSequence
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options
 from measure.film import FlagSize
 from measure.gate import WindowGate
+from measure.measuring_model import Network, gate_beside, network
 from measure.simulated_camera import write_film
 from sim.assets import Assets
 from sim.assets.flags import ROWS, FlagSheet

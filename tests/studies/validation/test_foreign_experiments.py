@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from measure.observe import parse
+from measure.trajectories import parse
 from measure.verdict import Conclusion
 from sim.cloth import Cloth
 from sim.cloth.material import named_material

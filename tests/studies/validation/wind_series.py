@@ -25,8 +25,8 @@ from flagdata.core.console import progress
 from flagdata.core.rng import child_seed
 from flagdata.core.stated import Stated
 from flagdata.ingest.films.film_array import Frames
-from measure.anemometer import Network, gate_beside, network
 from measure.estimate import SERIES_KEY, Measurement, Options, measure, of_model
+from measure.measuring_model import Network, gate_beside, network
 from tests.studies.long_films import LongFilm
 from tests.studies.series_errors import size_of
 from tests.studies.validation.wind_series_films import made

@@ -18,13 +18,13 @@ from measure.commands.close_loop import close_loop
 from measure.forecasting import strengths
 from measure.loop import LoopOptions
 from measure.observables import WINDOW
-from measure.observe import Experiment
+from measure.trajectories import Experiment
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
 from sim.run import load
 from tests.golden_answers import changes
 from tests.measure.cloth.loop.conftest import EFFECTS, recording
-from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import verdict
+from tests.measure.trajectories.flags import HEIGHT, RATE, WIDTH, write_tracks
 
 
 def table(path: Path, *, mean: float, effects: Mapping[str, float] | None = None) -> Path:
