@@ -13,6 +13,13 @@ from enum import StrEnum
 from typing import ClassVar
 
 
+def suggest(name: str, choices: Iterable[str]) -> str:
+    """Asks whether the nearest of `choices` was meant, "did you mean 'drag'?"; empty where none is
+    near."""
+    near = difflib.get_close_matches(name, choices, n=1)
+    return f"did you mean {near[0]!r}?" if near else ""
+
+
 class ErrorKind(StrEnum):
     """Names every kind of error, one for each class below `FlagdataError`; the texts are those of
     `--json`."""
@@ -161,6 +168,5 @@ class UnknownNameError(UsageError):
     ) -> UnknownNameError:
         """Build the error for `name`, suggesting the closest of `choices`."""
         names = sorted(choices)
-        close = difflib.get_close_matches(name, names, n=1)
-        fix = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(names) or 'none'}"
+        fix = suggest(name, names) or f"known: {', '.join(names) or 'none'}"
         return cls(f"unknown {noun} {name!r}", where=where, fix=fix)

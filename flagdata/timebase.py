@@ -9,7 +9,6 @@ several.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
@@ -17,7 +16,7 @@ from functools import cache
 from typing import Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
-from flagdata.errors import TimeError, UnknownNameError
+from flagdata.errors import TimeError, UnknownNameError, suggest
 
 _PLACES = (
     "Europe/Amsterdam",
@@ -164,13 +163,10 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         places = sorted(
             name for name in available_timezones() if "/" in name and not name.startswith("Etc/")
         )
-        close = difflib.get_close_matches(text, places, n=1)
         raise UnknownNameError(
             f"the time zone {name!r} is unknown",
             where=where,
-            fix=f"did you mean {close[0]!r}?"
-            if close
-            else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
+            fix=suggest(text, places) or "give a name such as Europe/Amsterdam, or +02:00, or UTC",
         ) from None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import time
 from collections.abc import Collection, Iterator, Sequence
@@ -16,7 +15,7 @@ from flagdata.core.files.durable import disk_errors
 from flagdata.core.printable import SHORT
 from flagdata.core.schema import CATALOG, Kind
 from flagdata.core.shell import command_line
-from flagdata.errors import NotFoundError, UnknownNameError
+from flagdata.errors import NotFoundError, UnknownNameError, suggest
 from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
@@ -190,9 +189,10 @@ class Store:
         )
         if not meant_rows:
             names = self.columns(view, ["name"])["name"].unique().to_pylist()
-            close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
-            suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
-            raise NotFoundError(f"there is no artifact {artifact!r}", where=where, fix=suggestion)
+            near = suggest(artifact, filter(None, names[:_NAMES]))
+            raise NotFoundError(
+                f"there is no artifact {artifact!r}", where=where, fix=f"{near} {listed}".lstrip()
+            )
         several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in meant_rows[:4])
         message = (
             f"{artifact!r} may mean {len(meant_rows)} artifacts: "

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 
 import pyarrow as pa
 
 from flagdata.core.schema import CATALOG, catalog_schema
+from flagdata.errors import suggest
 from flagdata.lake.rowfiles import Scan
 
 _COMPARED = re.compile(r"\b([A-Za-z_]\w*)\s*=\s*'((?:[^']|'')*)'")
@@ -30,13 +30,10 @@ def unknown_value(where: str | None, catalog: pa.Table | Scan) -> str | None:
         present = sorted(rows[name].drop_null().unique().to_pylist())
         if value in present:
             continue
-        close = difflib.get_close_matches(value, present[:_FEW], n=1)
-        if close:
-            known = f"did you mean {close[0]!r}?"
-        else:
-            more = ", …" if len(present) > _LISTED else ""
-            known = (
-                f"there {'are' if present else 'is'} {', '.join(present[:_LISTED]) or 'none'}{more}"
-            )
+        more = ", …" if len(present) > _LISTED else ""
+        known = (
+            suggest(value, present[:_FEW])
+            or f"there {'are' if present else 'is'} {', '.join(present[:_LISTED]) or 'none'}{more}"
+        )
         return f"no row has {name} {value!r}; {known}"
     return None

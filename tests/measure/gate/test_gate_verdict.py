@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from flagdata.core.findings import Finding, Severity
 from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
@@ -50,6 +51,23 @@ def test_one_window_keeps_its_p_value() -> None:
 def test_a_gate_of_few_clips_may_ask_for_a_smaller_p() -> None:
     assert not verdict([[reason(0.04)]], false_alarm=0.05, level=lambda rate: 0.6 * rate).refused
     assert verdict([[reason(0.02)]], false_alarm=0.05, level=lambda rate: 0.6 * rate).refused
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("scene-cut", "the picture changes at once"),
+        ("moving-camera", "the camera may move"),
+        (
+            "cut-off",
+            "motion reaches the picture's edge, so that a part of what moves may lie outside",
+        ),
+    ],
+)
+def test_a_fault_of_the_film_is_stated_in_a_few_words(kind: str, words: str) -> None:
+    fault = Finding(kind=kind, severity=Severity.ERROR, what="a sentence, as in a report: 3 px")
+    found = verdict([[reason(0.4)]], false_alarm=0.05, level=exact, faults=[fault])
+    assert (found.refused, found.refusal) == (True, words)
 
 
 def test_a_film_that_is_familiar_at_one_size_alone_is_refused_until_its_size_is_given() -> None:
