@@ -129,17 +129,19 @@ class Training(OfInputs, Computed, OnBranch):
 
 
 @make_call(Training)
-def train(chosen: Training) -> Mapping[str, Any]:
+def train(chosen: Training) -> Answer:
     """Trains a network on the clips of a lake and commits it as an artifact, as `flagdata train`
     does.
 
     ```python
     trained = flagdata.train("flow", lake="lake", at="v1")
-    trained["artifact"], trained["best"]["validation"]  # id, loss
+    trained.document["artifact"], trained.document["best"]["validation"]  # id, loss
+    trained.to_xarray()["validation_loss"]  # (epoch,)
     ```
 
     Returns:
-        What `flagdata train --json` prints; nothing in all ranks of a torchrun but the first.
+        The answer, in each rank of a torchrun; its `document` is what `flagdata train --json`
+        prints.
 
     Raises:
         ConflictError: another training is under way in the folder.

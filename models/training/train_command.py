@@ -25,10 +25,10 @@ from flagdata.dataset import Pairs
 from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.remaking import Remade
-from flagdata.verbs.verb_options import Result, verb
-from models.trained.model_folder import WEIGHTS, write_card, write_tensors
+from flagdata.verbs.verb_options import AsJson, Result, verb
+from models.trained.model_folder import WEIGHTS, read_card, write_card, write_tensors
 from models.training.steps import Trained
-from models.training.training_page import PAGE, judge_clips, training_answer
+from models.training.training_page import PAGE, JudgedClips, judge_clips, training_answer
 from models.training.training_recipe import TrainingRecipe
 
 PARENTS = 100
@@ -115,6 +115,7 @@ def publish(
     *,
     batches: dict[str, Any],
     branch: str,
+    judged: JudgedClips | None,
     page: Callable[[dict[str, Any]], str],
 ) -> tuple[Artifact, dict[str, Any], Remade | None]:
     """Commits a model and returns its row and card; one that is there already is kept, unless its
@@ -123,6 +124,7 @@ def publish(
     from the branch since the training began is not among its parents.
 
     Args:
+        judged: clips that validated; None of a network without targets.
         page: makes the training's page from the model's card.
 
     Raises:
@@ -136,6 +138,8 @@ def publish(
         card = card_of(recipe, data, trained, batches=batches)
         write_card(staged, card)
         (staged / PAGE).write_text(page(card), encoding="utf-8")
+        if judged is not None:
+            judged.write(staged)
         write_sums(staged)
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
@@ -153,8 +157,9 @@ _PREPARED = 0.05
 its film the rest."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
+    from flagdata.answer.answer import Answer
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
     from models.training.checkpoint import Standing
@@ -181,17 +186,18 @@ def train(chosen: Training) -> Iterator[Result]:
         loaded = replace(loaded, seed=chosen.seed)
     if chosen.sequences is not None:
         loaded = replace(loaded, data=replace(loaded.data, sequences=chosen.sequences))
-    report = train_and_publish(loaded, chosen, bars=progress)
-    if report is None:  # another rank of a torchrun reports
-        return
-    yield Result("train", report)
-    best = report["best"]
-    say(
-        f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the "
-        "best was "
-        f"{best['number'] + 1}, validation loss {best['validation']:.4f}"
-    )
-    echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
+    answer = train_and_publish(loaded, chosen, bars=progress)
+    if isinstance(chosen, AsJson) and _among_several() and os.environ["RANK"] != "0":
+        return  # of the commands of a torchrun the first prints
+    yield Result("train", answer.document, answer=answer)
+    say(answer.sentence)
+    trained = answer.document
+    echo(f"{trained['artifact']}  network {trained['name']}, seed {trained['seed']}")
+
+
+def _among_several() -> bool:
+    """Returns whether this is one of several processes of a torchrun."""
+    return "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
 
 
 def train_and_publish(
@@ -199,9 +205,9 @@ def train_and_publish(
     chosen: Training,
     *,
     bars: Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]],
-) -> dict[str, Any] | None:
-    """Prepares, trains and publishes; returns what the command reports, or None in all ranks but
-    the first.
+) -> Answer:
+    """Prepares, trains and publishes; returns how far the training came. Of a torchrun the first
+    rank publishes, and all return the same.
 
     Raises:
         FlagdataError: see `models.training.steps.Training.complete`,
@@ -214,7 +220,6 @@ def train_and_publish(
     from flagdata.core.provenance import digest
     from flagdata.dataset.lake_source import open_source
     from flagdata.lake.remaking import present, said
-    from models.trained.model_folder import read_card
     from models.training.beginning import check_clips
     from models.training.checkpoint import check_folder
     from models.training.inputs import film_rows, prepare_clips, prepare_films
@@ -237,9 +242,7 @@ def train_and_publish(
         existing = present(source.lake, source.lake.artifact(wanted, at=branch))
         if existing.whole is not None:
             say("this model was trained before")
-            return _report(
-                existing.whole, read_card(source.lake.object_path(str(existing.whole.object)))
-            )
+            return answer_of_model(recipe, source.lake, existing.whole, validation_pairs)
         say(
             "this model was trained before, but its object is damaged or missing: it is trained "
             "again"
@@ -247,7 +250,7 @@ def train_and_publish(
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     check_clips(recipe, source.lake, train_pairs, validation_pairs, films=films, at=at)
     torch.set_num_threads(max(1, workers))
-    several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
+    several = _among_several()
     if several:
         device = device_of_rank(device)
         # The others wait while the first prepares the inputs, which takes hours where there are
@@ -333,26 +336,48 @@ def train_and_publish(
         done = training.complete(standing)
         if several:
             ranks.barrier()  # no rank leaves while another still talks to it
-        if not first:
-            return None
-        judged = judge_clips(recipe, done.learner, training.validation)
-        row, card, healed = publish(
-            source.lake,
-            recipe,
-            data,
-            recordings,
-            done,
-            batches=training.batches.state(),
-            branch=branch,
-            page=lambda card: training_answer(recipe, card, judged, validation_pairs).page,
-        )
-        if healed is not None:
-            say(said(row.id, healed))
+        if first:
+            judged = judge_clips(recipe, done.learner, training.validation)
+            row, card, healed = publish(
+                source.lake,
+                recipe,
+                data,
+                recordings,
+                done,
+                batches=training.batches.state(),
+                branch=branch,
+                judged=judged,
+                page=lambda card: training_answer(recipe, card, judged, validation_pairs).page,
+            )
+            if healed is not None:
+                say(said(row.id, healed))
+            answer = training_answer(recipe, card, judged, validation_pairs, artifact=row)
+            if several:
+                ranks.broadcast_object_list([row.id])
+        else:
+            published: list[Any] = [None]
+            ranks.broadcast_object_list(published)
+            row = source.lake.artifact(published[0], at=branch)
+            answer = answer_of_model(recipe, source.lake, row, validation_pairs)
     finally:
         locks.close()
         if several:
             ranks.destroy_process_group()
-    return _report(row, card)
+    return answer
+
+
+def answer_of_model(recipe: TrainingRecipe, lake: Lake, row: Artifact, pairs: Pairs) -> Answer:
+    """Returns how far the training of a model of a lake came.
+
+    Args:
+        pairs: that validated it.
+
+    Raises:
+        CorruptError: the model is damaged.
+    """
+    folder = lake.object_path(str(row.object))
+    judged = JudgedClips.read(folder, recipe)
+    return training_answer(recipe, read_card(folder), judged, pairs, artifact=row)
 
 
 def _place(standing: Standing, epochs: int) -> str:
@@ -392,22 +417,6 @@ def _refuse(folder: Path) -> None:
         where=str(folder),
         fix="wait until it has ended, or name another folder by --run",
     )
-
-
-def _report(row: Artifact, card: Mapping[str, Any]) -> dict[str, Any]:
-    reported = (
-        "name",
-        "title",
-        "seed",
-        "parameters",
-        "epochs",
-        "best",
-        "seconds",
-        "data",
-        "recipe_hash",
-        "code_version",
-    )
-    return {"artifact": row.id, "object": row.object, **{key: card[key] for key in reported}}
 
 
 def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | None) -> Pairs:

@@ -1,28 +1,35 @@
-"""The page of a training: losses by epoch, and how the network reads clips that it did not learn
+"""What a training answers: losses by epoch, and how the network reads clips that it did not learn
 from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from flagdata.answer.answer import Answer, Figure, Gallery, Head, Section, Table, Tone
+from flagdata.answer.answer import Answer, Array, Figure, Gallery, Head, Section, Table, Tone
 from flagdata.answer.charts import Axis, Chart, Colour, Dots, Line, Panel
+from flagdata.answer.quantity import Bound, Quantity, Span
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.dataset import Pairs
+from flagdata.lake import Artifact
 from flagdata.pages.page_pictures import moving
 from models.networks.learner import Learner, Loss
 from models.networks.targets import TARGETS, Target
 from models.trained.estimator import Estimator
+from models.trained.model_folder import read_tensors, write_tensors
 from models.training.inputs import Prepared, clip_as_taken
 from models.training.progress import LossCourse
 from models.training.training_recipe import TrainingRecipe
 
 PAGE = "training.html"
+_JUDGED = "judged.safetensors"
+"""In a model's folder the clips that its page shows; models of earlier versions have none."""
 _LEVEL = 0.90
 _SHOWN = 6
 _MOST = 400
@@ -59,6 +66,26 @@ class JudgedClips:
         order = np.argsort(self.truth, kind="stable")
         places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
         return [int(place) for place in order[places]]
+
+    def write(self, folder: Path) -> None:
+        """Writes the clips to a model's folder."""
+        names = [one.name for one in fields(self) if one.name != "target"]
+        tensors = {name: torch.from_numpy(getattr(self, name)) for name in names}
+        write_tensors(folder / _JUDGED, tensors)
+
+    @classmethod
+    def read(cls, folder: Path, recipe: TrainingRecipe) -> JudgedClips | None:
+        """Reads the clips of the model in a folder; None where it has none.
+
+        Raises:
+            CorruptError: the file is damaged.
+        """
+        if not (folder / _JUDGED).is_file():
+            return None
+        arrays: dict[str, Any] = {
+            name: tensor.numpy() for name, tensor in read_tensors(folder / _JUDGED).items()
+        }
+        return cls(target=TARGETS[recipe.loss.targets[0]], **arrays)
 
 
 @torch.no_grad()
@@ -109,7 +136,12 @@ def _estimator(recipe: TrainingRecipe, learner: Learner) -> Estimator:
 
 
 def training_answer(
-    recipe: TrainingRecipe, card: dict[str, Any], judged: JudgedClips | None, pairs: Pairs
+    recipe: TrainingRecipe,
+    card: Mapping[str, Any],
+    judged: JudgedClips | None,
+    pairs: Pairs,
+    *,
+    artifact: Artifact | None = None,
 ) -> Answer:
     """Returns how far a training came.
 
@@ -117,6 +149,7 @@ def training_answer(
         card: of the model.
         judged: clips that validated; None of a network without targets.
         pairs: that they are of.
+        artifact: the model in the lake; None before it is there.
     """
     course = LossCourse.of(card["course"])
     figures = [Figure(title="Losses and learning rate by the epoch", content=course.chart())]
@@ -129,6 +162,9 @@ def training_answer(
                 "epoch was chosen by them, so that others are read a little worse.",
             )
         )
+    provenance = {"recipe": recipe.hash, "seed": str(recipe.seed)}
+    if artifact is not None:
+        provenance["artifact"] = artifact.id
     return Answer(
         question="train",
         subject=recipe.name
@@ -136,11 +172,64 @@ def training_answer(
         else f"{recipe.name}: {recipe.title}",
         sentence=_sentence(recipe, course, judged),
         tone=Tone.SETTLED if course.epochs else Tone.OPEN,
-        document=card,
+        quantities={} if judged is None else {"rmse": _rmse(judged)},
+        arrays=_course_arrays(course) | ({} if judged is None else _clip_arrays(judged)),
+        document=_document(card, artifact),
         head=Head(figures=figures, facts=_facts(card)),
         make_sections=lambda: [*_sections(recipe, course, judged, pairs)],
-        provenance={"recipe": recipe.hash, "seed": str(recipe.seed)},
+        provenance=provenance,
     )
+
+
+def _document(card: Mapping[str, Any], artifact: Artifact | None) -> dict[str, Any]:
+    names = ("name", "title", "seed", "parameters", "epochs", "best", "seconds", "data")
+    return {
+        "artifact": None if artifact is None else artifact.id,
+        "object": None if artifact is None else artifact.object,
+        **{name: card[name] for name in (*names, "recipe_hash", "code_version")},
+    }
+
+
+def _rmse(judged: JudgedClips) -> Quantity:
+    """Returns the error of the clips that chose the epoch, which say nothing about others: it has
+    no interval."""
+    span = Span(low=-math.inf, high=math.inf, level=_LEVEL, bound=Bound.NOTHING, estimated=False)
+    return Quantity(name="rmse", unit=judged.target.unit, value=judged.error, sigma=None, span=span)
+
+
+def _course_arrays(course: LossCourse) -> dict[str, Array]:
+    """Returns the curves over the epochs."""
+    columns = {
+        "training_loss": ("1", "mean loss of the clips that are learned", "train"),
+        "validation_loss": ("1", "mean loss of the clips that validate", "validation"),
+        "learning_rate": ("1", "at the epoch's end", "rate"),
+        "seconds": ("s", "that the epoch took", "seconds"),
+    }
+    numbers = np.array([epoch.number + 1 for epoch in course.epochs], dtype=np.int64)
+    return {
+        "epoch": Array(dimensions=("epoch",), values=numbers, about="from 1", coordinate=True),
+        **{
+            name: Array(
+                dimensions=("epoch",),
+                values=np.array([getattr(epoch, key) for epoch in course.epochs]),
+                unit=unit,
+                about=about,
+            )
+            for name, (unit, about, key) in columns.items()
+        },
+    }
+
+
+def _clip_arrays(judged: JudgedClips) -> dict[str, Array]:
+    """Returns truth and estimate over the clips that validate."""
+    columns = {"true": judged.truth, "estimated": judged.estimate}
+    if len(judged.low):
+        columns |= {"estimated_low": judged.low, "estimated_high": judged.high}
+    about = f"{judged.target.about} of clips that validate"
+    return {
+        name: Array(dimensions=("clip",), values=values, unit=judged.target.unit, about=about)
+        for name, values in columns.items()
+    }
 
 
 def _sentence(recipe: TrainingRecipe, course: LossCourse, judged: JudgedClips | None) -> str:
@@ -157,7 +246,7 @@ def _sentence(recipe: TrainingRecipe, course: LossCourse, judged: JudgedClips | 
     )
 
 
-def _facts(card: dict[str, Any]) -> dict[str, str]:
+def _facts(card: Mapping[str, Any]) -> dict[str, str]:
     return {
         "parameters": f"{card['parameters']:,}",
         "epochs": str(card["epochs"]),

@@ -4,8 +4,12 @@ refused."""
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import socket
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -150,6 +154,89 @@ def test_training_again_changes_nothing(lake: Path) -> None:
     report = run("train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake))
     assert report["seed"] == 1
     assert Lake.open(lake).rows().num_rows == before
+
+
+def test_the_call_returns_the_answer_that_the_command_prints_with_curves_and_clips(
+    lake: Path,
+) -> None:
+    recipe = str(lake.parent / "small.toml")
+    answer = flagdata.train(recipe, lake=str(lake), at="v1", workers=1)
+    printed = run("train", recipe, "--at", "v1", "--lake", str(lake))
+    assert answer.document == {key: printed[key] for key in printed if key != "schema"}
+    folder = Lake.open(lake).object_path(answer.document["object"])
+    course = read_card(folder)["course"]
+    found = answer.to_xarray()
+    assert found["epoch"].values.tolist() == [1, 2, 3]
+    for name, key in (("training_loss", "train"), ("validation_loss", "validation")):
+        assert found[name].values.tolist() == [epoch[key] for epoch in course]
+    assert found["true"].attrs["units"] == "m/s"
+    difference = found["estimated"] - found["true"]
+    rmse = answer.quantities["rmse"]
+    assert rmse.value == pytest.approx(float((difference**2).mean()) ** 0.5)
+    assert f"{rmse.value:.3g} m/s" in answer.sentence
+    assert (found["estimated_low"] <= found["estimated_high"]).all()
+    assert re.findall(r"true (-?[\d.]+) m/s", answer.page)
+
+
+_RANK = """
+import json, os, sys
+from pathlib import Path
+import flagdata
+recipe, lake, out = sys.argv[1:]
+answer = flagdata.train(recipe, lake=lake, at="v1", seed=8, workers=1)
+kept = {"document": answer.document, "page": answer.page}
+Path(out, os.environ["RANK"]).write_text(json.dumps(kept))
+"""
+
+
+def test_each_process_of_a_torchrun_returns_the_answer_and_the_command_of_the_first_prints(
+    lake: Path, tmp_path: Path
+) -> None:
+    own, out = tmp_path / "lake", tmp_path / "out"
+    shutil.copytree(lake, own)
+    out.mkdir()
+    recipe = str(lake.parent / "small.toml")
+    command = [recipe, "--lake", str(own), "--at", "v1", "--seed", "8", "--json"]
+
+    def run_ranks(*arguments: str) -> list[str]:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = str(free.getsockname()[1])
+        place = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "WORLD_SIZE": "2"}
+        processes = [
+            subprocess.Popen(
+                [sys.executable, *arguments],
+                env=os.environ | place | {"RANK": str(rank), "OMP_NUM_THREADS": "1"},
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            for rank in range(2)
+        ]
+        texts = [process.communicate(timeout=500)[0] for process in processes]
+        assert [process.returncode for process in processes] == [0, 0]
+        return texts
+
+    run_ranks("-c", _RANK, recipe, str(own), str(out))
+    first, second = (json.loads((out / rank).read_text()) for rank in "01")
+    assert first == second
+    assert Lake.open(own).artifact(first["document"]["artifact"]).seed == 8
+    printed, nothing = run_ranks("-m", "flagdata.cli", "train", *command)
+    assert nothing == ""
+    assert json.loads(printed)["artifact"] == first["document"]["artifact"]
+
+
+def test_a_model_of_an_earlier_version_answers_without_the_clips_that_validated(
+    lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = Lake.open(lake).rows("kind = 'network'").to_pylist()[0]
+    folder = tmp_path / "model"
+    shutil.copytree(Lake.open(lake).object_path(row["object"]), folder)
+    (folder / "judged.safetensors").unlink()
+    monkeypatch.setattr(Lake, "object_path", lambda *_: folder)
+    recipe = str(lake.parent / "small.toml")
+    answer = flagdata.train(recipe, lake=str(lake), at="v1", seed=row["seed"])
+    assert "small is trained; epoch" in answer.sentence
+    assert not answer.quantities
+    assert len(answer.arrays["epoch"].values) == 3
 
 
 def test_a_model_that_is_committed_is_reported_without_reading_the_lake_again(
