@@ -1,9 +1,9 @@
 """Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on
 where it was.
 
-A bank about one posterior is a parametric bootstrap by brute force. A bank over priors serves every
-recording of such
-a design: an amortised null.
+A bank is of one design: one nominal cloth, its markers, their noise and the rate. It serves all
+recordings of that design, and none of another: of 33 sets of one effect a test by 48 kinds of their
+own design rejected 20, by 45 kinds of seven cloths, three noises and two rates 5.
 """
 
 from __future__ import annotations

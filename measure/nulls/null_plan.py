@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from flagdata.core.arrays import FloatArray
 from flagdata.core.files.caches import user_cache
 from flagdata.core.provenance import array_hash, recipe_hash
 from flagdata.core.rng import child_seed
@@ -35,8 +38,8 @@ class NullOptions:
         nulls: null recordings simulated where no bank is given, in whole batches; at least
             `FEWEST_NULLS`. A verdict simulates half as many, or fewer, where these show that the
             base model is not rejected (see `first_round`).
-        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this
-            cloth, its markers and winds, over the same priors.
+        bank: a folder of nulls of this design: its cloth, markers, noise and rate; None simulates
+            them.
         workers: processes for the nulls, then threads for what is fitted.
         scheduler: address of a Dask scheduler whose workers simulate the nulls; None for processes
             of this machine.
@@ -122,73 +125,91 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
     """Loads the bank of a folder, made as `measure.nulls.bank` does.
 
     Raises:
-        InputError: its segments or anchors are not like the recordings'.
+        InputError: it is of another design; see `check`.
         FlagdataError: as `measure.nulls.bank.load`.
     """
-    bank = banks.load(folder, words=f"over priors, from {folder.name}")
+    bank = banks.load(folder, words=f"of this design, from {folder.name}")
     check(bank, setting, where=str(folder))
     return replace(bank, words=bank.words + _CARRIED) if bank.carried else bank
 
 
 def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
-    """Refuses nulls that do not fit the recordings.
+    """Refuses nulls of another design than the recordings'. How nulls scatter differs between
+    cloths, noises and rates, so that those of others hide most effects.
 
     Raises:
-        InputError: segments of another length or frame interval, anchors known in another way, or
-            cloths held in another way.
+        InputError: segments of another length or frame interval, anchors known in another way,
+            cloths held in another way, another nominal cloth, another number of markers, or
+            markers of another noise.
     """
-    if bank.anchors_given != setting.experiment.specimen.anchors_given:
-        ways = ("taken from where the recordings show the attachments", "given")
-        raise InputError(
-            f"the bank's anchors were {ways[bank.anchors_given]}, those of the recordings are "
-            f"{ways[not bank.anchors_given]}",
-            where=where,
-            fix="simulate nulls for these recordings: leave the bank out",
-        )
-    if bank.carried != setting.experiment.carried:
-        ways = ("held still", "carried")
-        raise InputError(
-            f"the bank's cloths were {ways[bank.carried]}, that of the recordings is "
-            f"{ways[not bank.carried]}",
-            where=where,
-            fix="simulate nulls for these recordings: leave the bank out",
-        )
-    if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
-        raise InputError(
-            f"its segments last {bank.duration:.2g} s, those of the recordings "
-            f"{setting.segments.duration:.2g} s",
-            where=where,
-            fix="simulate nulls for these recordings: leave the bank out; or record for longer",
-        )
-    shortest, longest, period = (
-        bank.nulls.period.min(),
-        bank.nulls.period.max(),
-        setting.segments.period,
+    nulls, design = bank.nulls, setting.design
+    known = ("taken from where recordings show the attachments", "that are given")
+    held = ("held still", "carried")
+    anchors, carried = setting.experiment.specimen.anchors_given, setting.experiment.carried
+    counts = nulls.statistics.marker_error.shape[1], len(setting.segments.markers)
+    lengths = bank.duration, setting.segments.duration
+    compared = (
+        (bank.anchors_given == anchors, "anchors {}", known[bank.anchors_given], known[anchors]),
+        (bank.carried == carried, "cloths that are {}", held[bank.carried], held[carried]),
+        (_alike(*lengths), "segments of {} s", *(f"{length:.2g}" for length in lengths)),
+        (counts[0] == counts[1], "{} markers", *counts),
+        (
+            bool((nulls.cloth == design.cloth).all()),
+            "the nominal cloth {}",
+            ", ".join(str(cloth)[:8] for cloth in np.unique(nulls.cloth)),
+            design.cloth[:8],
+        ),
+        _compared("frames {} ms apart", nulls.period, design.period),
+        _compared("markers with a noise of {} mm", nulls.noise, design.noise),
     )
-    if not 0.9 * shortest < period < 1.1 * longest:
-        raise InputError(
-            f"its frames are {1e3 * shortest:.3g} to {1e3 * longest:.3g} ms apart, those of the "
-            "recordings "
-            f"{1e3 * period:.3g} ms",
-            where=where,
-            fix="simulate nulls for these recordings: leave the bank out",
-        )
+    for same, what, of_bank, of_recordings in compared:
+        if not same:
+            raise InputError(
+                f"the bank has {what.format(of_bank)}, the recordings have "
+                f"{what.format(of_recordings)}",
+                where=where,
+                fix="simulate nulls for these recordings: leave the bank out",
+            )
 
 
-def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
+def _compared(what: str, of_nulls: FloatArray, own: float) -> tuple[bool, str, str, str]:
+    """Compares intervals [s] or noises [m] of nulls with that of the recordings, in thousandths."""
+    values = np.unique(of_nulls)
+    return (
+        all(_alike(value, own) for value in values),
+        what,
+        ", ".join(f"{1e3 * value:.3g}" for value in values),
+        f"{1e3 * own:.3g}",
+    )
+
+
+def _alike(own: float, other: float) -> bool:
+    """Whether two lengths, intervals or noises belong to one design: they differ by a tenth at
+    most."""
+    return abs(own - other) <= 0.1 * max(own, other)
+
+
+def batches(setting: Setting, *others: Setting, kinds: int, seed: int) -> list[NullBatch]:
     """Draws nulls over the priors of the cloth, of the winds of an experiment and carried as it is:
     a batch for each kind of numerics. Those of one cloth hold as many segments as the data, and are
     as noisy as the noisiest of its recordings.
+
+    Args:
+        others: experiments of the same design, whose winds are gone through too.
     """
-    segments, recordings = setting.segments, setting.experiment.recordings
+    segments, experiments = setting.segments, (setting, *others)
+    recordings = [own for one in experiments for own in one.experiment.recordings]
+    speeds = np.concatenate([one.speeds for one in experiments])
     drawn = [
         banks.prior_batch(
             setting.experiment.specimen,
             markers=segments.markers,
             rate=1 / segments.period,
             noise=setting.design.noise,
-            duration=segments.cut.lasting(banks.segments_of_each(len(segments))),
-            speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
+            duration=segments.cut.lasting(
+                banks.segments_of_each(max(len(one.segments) for one in experiments))
+            ),
+            speeds=banks.around(float(speeds.min()), float(speeds.max())),
             seed=child_seed(seed, "null", index),
         )
         for index in range(kinds)

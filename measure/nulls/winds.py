@@ -39,7 +39,7 @@ def like(
         seed: of the draws.
     """
     blowing = [recording for recording in recordings if _mean(recording) > _STILL]
-    if not any(_fluctuates(recording) for recording in blowing):
+    if not any(fluctuates(recording) for recording in blowing):
         return ()
     rng = stream(seed, "null", "winds")
     times = np.arange(round((SETTLE + duration) / _EVERY) + 2, dtype=np.float64) * _EVERY
@@ -55,7 +55,8 @@ def like(
     return tuple(drawn)
 
 
-def _fluctuates(recording: Trajectory) -> bool:
+def fluctuates(recording: Trajectory) -> bool:
+    """Whether the log of a recording is not steady."""
     wind = recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY))
     return bool(np.linalg.norm(wind.std(axis=0)) > _STEADY * recording.wind.speed)
 

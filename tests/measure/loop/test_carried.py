@@ -153,7 +153,7 @@ def test_nulls_of_cloths_held_still_do_not_judge_one_that_is_carried(bank: Path)
         replace(data, recordings=tuple(replace(own, attachments=None) for own in data.recordings))
     )
     with pytest.raises(
-        InputError, match="cloths were carried, that of the recordings is held still"
+        InputError, match="cloths that are carried, the recordings have cloths that are held still"
     ):
         null_plan.check(loaded, still)
 

@@ -296,7 +296,7 @@ def test_a_bank_of_other_segments_is_refused(
     specimen: Specimen, plain: Experiment, bank: Path
 ) -> None:
     short = tuple(replace(r, positions=r.positions[:60]) for r in plain.recordings)
-    with pytest.raises(InputError, match="segments last"):
+    with pytest.raises(InputError, match="the bank has segments of"):
         close_loop(
             Experiment(specimen=specimen, recordings=short), LoopOptions(bank=bank, level=0.1)
         )
@@ -307,7 +307,7 @@ def test_a_bank_with_anchors_known_in_another_way_is_refused(
 ) -> None:
     data = replace(plain, specimen=replace(specimen, anchors_given=False))
     with pytest.raises(
-        InputError, match="anchors were given, those of the recordings are taken from where"
+        InputError, match="anchors that are given, the recordings have anchors taken from where"
     ):
         close_loop(data, LoopOptions(bank=bank, level=0.1))
 

@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from measure.forecasting import Setting
-from measure.nulls import GroupedConformal, NullBatch, null_plan
+from measure.inference.random_effect import Nulls
+from measure.nulls import GroupedConformal, NullBank, NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.trajectories import Experiment, Specimen, Trajectory
+from measure.probes.statistics import Statistics
+from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 
 
 @pytest.fixture
@@ -62,6 +66,87 @@ def test_nulls_are_kept_by_their_design(
     other = Setting.of(replace(setting.experiment, recordings=noisy))
     assert asked(monkeypatch, tmp_path, other)[0] != folder
     assert asked(monkeypatch, tmp_path, setting, seed=1)[0] != folder
+
+
+def like(setting: Setting, **changed: Any) -> NullBank:
+    """A bank of two recordings by each of four kinds of numerics, of the design of an
+    experiment."""
+    segments = 8
+    markers = len(setting.segments.markers)
+    one: dict[str, Any] = {
+        "noise": np.full(segments, setting.design.noise),
+        "period": np.full(segments, setting.design.period),
+        "cloth": np.full(segments, setting.design.cloth),
+        "markers": markers,
+        "duration": setting.segments.duration,
+        "anchors_given": True,
+        "carried": False,
+    } | changed
+    return NullBank(
+        nulls=Nulls(
+            statistics=Statistics(
+                recording=np.arange(segments),
+                r=np.zeros((segments, 1)),
+                response=np.zeros((segments, 1, 1)),
+                error=np.zeros(segments),
+                marker_error=np.zeros((segments, one["markers"])),
+            ),
+            speeds=np.full(segments, 4.0),
+            calibration=np.zeros((segments, 3)),
+            numerics=np.repeat(np.arange(4), 2),
+            **{name: one[name] for name in ("noise", "period", "cloth")},
+        ),
+        columns=("lift.coefficient",),
+        words="made",
+        **{name: one[name] for name in ("duration", "anchors_given", "carried")},
+    )
+
+
+MIXED = np.tile([0.0, 1e-3], 4)
+
+
+@pytest.mark.parametrize(
+    ("changed", "refused"),
+    [
+        ({}, ""),
+        ({"noise": np.full(8, 0.95e-3)}, ""),
+        ({"noise": np.full(8, 4e-3)}, "a noise of 4 mm, the recordings have markers with a noise"),
+        ({"noise": MIXED}, "a noise of 0, 1 mm, the recordings have markers with a noise of 1 mm"),
+        ({"period": np.full(8, 1 / 60)}, "frames 16.7 ms apart, the recordings have frames 40 ms"),
+        ({"period": np.tile([1 / 25, 1 / 60], 4)}, "frames 16.7, 40 ms apart"),
+        ({"cloth": np.repeat(["denim", "knit"], 4)}, "the nominal cloth denim, knit, the record"),
+        ({"markers": 12}, "12 markers, the recordings have 63 markers"),
+        ({"duration": 5.0}, "segments of 5 s"),
+        ({"carried": True}, "cloths that are carried"),
+        ({"anchors_given": False}, "anchors taken from where recordings show the attachments"),
+    ],
+)
+def test_a_bank_of_another_design_is_refused(
+    setting: Setting, changed: dict[str, Any], refused: str
+) -> None:
+    noisy = tuple(replace(r, noise=1e-3) for r in setting.experiment.recordings)
+    data = Setting.of(replace(setting.experiment, recordings=noisy))
+    if not refused:
+        null_plan.check(like(data, **changed), data)
+        return
+    with pytest.raises(InputError, match=refused) as error:
+        null_plan.check(like(data, **changed), data, where="bank")
+    assert error.value.where == "bank"
+    assert error.value.fix == "simulate nulls for these recordings: leave the bank out"
+
+
+def test_nulls_of_several_experiments_of_a_design_go_through_the_winds_of_all(
+    setting: Setting,
+) -> None:
+    (own,) = setting.experiment.recordings
+    faster = replace(own, wind=WindTrack.constant((8.0, 0.0, 0.0)))
+    other = Setting.of(replace(setting.experiment, recordings=(faster,)))
+    alone, alike = (
+        null_plan.batches(setting, *others, kinds=2, seed=3) for others in ((), (other,))
+    )
+    assert max(speed for batch in alone for speed in batch.speeds) <= 4.4
+    assert 6.6 < max(speed for batch in alike for speed in batch.speeds) <= 8.8
+    assert [batch.calibrations for batch in alone] == [batch.calibrations for batch in alike]
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def challenge() -> None:
     \b
       python -m tests.studies challenge make out/challenge --seed 7 --sets 60 --workers 2
       python -m tests.studies challenge make out/films --recipe films --seed 7 --sets 40 --workers 2
-      python -m tests.studies challenge bank out/bank --seed 8 --workers 2
+      python -m tests.studies challenge bank out/bank --sets out/challenge --seed 8 --workers 2
       python -m tests.studies challenge run out/challenge --bank out/bank --workers 2
       python -m tests.studies challenge score out/challenge --out docs/results
     """
@@ -90,12 +90,17 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @challenge.command()
 @_FOLDER
 @click.option(
+    "--sets",
+    type=LocalPath(),
+    metavar="DIR",
+    help="Folder of a challenge: nulls of each design among its sets, each in a folder of its own.",
+)
+@click.option(
     "--recipe",
-    default="standard",
-    show_default=True,
-    help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of "
-    "close-loop, for nulls of its "
-    "cloth, markers and winds.",
+    type=LocalPath(),
+    metavar="FILE.toml",
+    help="In place of --sets a recipe of close-loop: nulls of its cloth, markers, noise, rate and "
+    "winds.",
 )
 @click.option(
     "--seed",
@@ -113,9 +118,9 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @click.option(
     "--kinds",
     type=click.IntRange(min=4),
-    default=112,
+    default=48,
     show_default=True,
-    help="Number of kinds of numerics (meshes and methods).",
+    help="Number of kinds for each design: meshes, methods and cloths.",
 )
 @click.option(
     "--workers",
@@ -131,7 +136,8 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @json_option
 def bank(
     folder: Path,
-    recipe: str,
+    sets: Path | None,
+    recipe: Path | None,
     seed: int,
     lake_path: Place | None,
     kinds: int,
@@ -139,23 +145,46 @@ def bank(
     scheduler: str | None,
     as_json: bool,
 ) -> None:
-    """Simulate nulls that all sets of a recipe share, by what participants know; a build that was
+    """Simulate nulls that all sets of a design share, by what participants know; a build that was
     stopped goes on."""
     from flagdata.lake import Lake
     from measure.nulls import bank as banks
     from measure.nulls.null_workload import of_batches
-    from tests.studies.challenge.nulls import claim, nulls_of
+    from tests.studies.challenge.folder import ChallengeFolder
+    from tests.studies.challenge.nulls import claim, nulls_of_recordings, nulls_of_sets
 
-    lake = None if lake_path is None else Lake.open(lake_path)
-    origin, batches = nulls_of(recipe, seed=seed, kinds=kinds, lake=lake)
-    claim(folder, origin, seed=seed)
-    say(of_batches(batches, workers=workers))
-    with progress(kinds, label="null recordings", unit="kind") as advance:
-        banks.build(folder, batches, workers=workers, scheduler=scheduler, progress=advance)
+    if sets is not None and recipe is None:
+        made = nulls_of_sets(folder, ChallengeFolder(sets), seed=seed, kinds=kinds)
+    elif recipe is not None and sets is None:
+        lake = None if lake_path is None else Lake.open(lake_path)
+        made = [nulls_of_recordings(folder, recipe, seed=seed, kinds=kinds, lake=lake)]
+    else:
+        raise UsageError(
+            "nulls are of one design",
+            where="challenge bank",
+            fix="give either --sets, the folder of a challenge, or --recipe, a recipe of close-loop",
+        )
+    for design in made:
+        claim(design, seed=seed)
+    say(of_batches([batch for design in made for batch in design.batches], workers=workers))
+    with progress(kinds * len(made), label="null recordings", unit="kind") as advance:
+        for design in made:
+            banks.build(
+                design.folder,
+                design.batches,
+                workers=workers,
+                scheduler=scheduler,
+                progress=advance,
+            )
     if as_json:
         document(
             "challenge-bank",
-            {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS},
+            {
+                "folder": str(folder),
+                "kinds": kinds,
+                "designs": [design.folder.name for design in made],
+                "recordings": kinds * banks.WINDS * len(made),
+            },
         )
     else:
         echo(str(folder))
@@ -178,7 +207,7 @@ def bank(
 @click.option(
     "--bank",
     type=LocalPath(),
-    help="Folder of simulated nulls that the sets share; of films, where their simulations are "
+    help="Folder with the simulated nulls of each design; of films, where their simulations are "
     "kept.",
 )
 @json_option

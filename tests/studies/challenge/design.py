@@ -15,7 +15,14 @@ from flagdata.errors import UsageError
 from sim.effects import ClothEffect
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.classes import class_of
-from tests.studies.challenge.recipe import ChallengeRecipe, Kind, Method, Strengths, effect_type
+from tests.studies.challenge.recipe import (
+    ChallengeRecipe,
+    Kind,
+    Method,
+    SetDesign,
+    Strengths,
+    effect_type,
+)
 
 T = TypeVar("T")
 _HEADING = 0.5  # rad: how far from downwind a flag starts
@@ -36,8 +43,8 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
     """The keys of `count` sets, in the order of their names, which says nothing; impacts are not
     known yet.
 
-    Effects, noises, rates and strengths that are fixed beforehand are dealt out evenly, everything
-    else is drawn for each set.
+    Effects, designs, noises, rates and strengths that are fixed beforehand are dealt out evenly,
+    everything else is drawn for each set.
 
     Raises:
         UsageError: fewer than one set.
@@ -61,6 +68,7 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
 
     nulls = iter(deal("numerics of nulls", list(recipe.numerics), number[Kind.NULL]))
     rates, noises = deal("rate", recipe.rates, count), deal("noise", recipe.noises, count)
+    designs = deal("design", list(recipe.designs.values()), count if recipe.designs else 0)
     varying = deal("wind", [index < round(10 * recipe.varying) for index in range(10)], count)
     order = stream(seed, "order").permutation(count)
     turns = [groups[:index].count(group) for index, group in enumerate(groups)]
@@ -68,22 +76,38 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
     for place, index in enumerate(order.tolist()):
         kind, effects = groups[index]
         numerics = next(nulls) if kind is Kind.NULL else _numerics(recipe, seed, kind, effects)
-        keys.append(
-            _key(
-                recipe,
-                stream(seed, "set", index),
-                name=f"set-{place + 1:03d}",
-                kind=kind,
-                effects=effects,
-                turn=None if kind is Kind.PAIR else turns[index],
-                numerics=numerics,
-                rate=rates[index],
-                noise=noises[index],
-                varying=varying[index],
-                shared=None if recipe.films is None else stream(seed, "winds"),
-            )
+        key = _key(
+            recipe,
+            stream(seed, "set", index),
+            name=f"set-{place + 1:03d}",
+            kind=kind,
+            effects=effects,
+            turn=None if kind is Kind.PAIR else turns[index],
+            numerics=numerics,
+            rate=rates[index],
+            noise=noises[index],
+            varying=varying[index],
+            shared=None if recipe.films is None else stream(seed, "winds"),
         )
+        if recipe.designs:
+            key = _of_design(key, designs[index], stream(seed, "design", index))
+        keys.append(key)
     return tuple(keys)
+
+
+def _of_design(key: AnswerKey, design: SetDesign, rng: np.random.Generator) -> AnswerKey:
+    """A key whose cloth, rate, noise and wind are those of a design; a cloth that was weighed
+    differs from its nominal weight by the error of the scale."""
+    weighed, share = float(rng.standard_normal()), float(rng.random())
+    density = math.exp(design.weight_sigma * weighed) if design.weight_sigma else key.density
+    return replace(
+        key,
+        material=design.material,
+        rate=design.rate,
+        noise=design.noise,
+        density=density,
+        intensity=0.0 if design.intensity is None else design.intensity.at(share),
+    )
 
 
 def _deal(rng: np.random.Generator, cards: Sequence[T], wanted: int) -> list[T]:

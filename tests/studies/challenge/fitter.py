@@ -19,8 +19,8 @@ class ClosingTheLoop:
     """`flagdata close-loop`, as a user runs it.
 
     Attributes:
-        bank: folder of simulated nulls that several experiments share; None to simulate them anew
-            for each.
+        bank: folder with the simulated nulls of each design; None to simulate them anew for each
+            experiment.
     """
 
     bank: Path | None = None
@@ -30,11 +30,14 @@ class ClosingTheLoop:
 
         Raises:
             InputError: the data do not do.
+            NotFoundError: the folder has no nulls of this design.
         """
         from measure.closing import close_loop
         from measure.loop import LoopOptions
+        from tests.studies.challenge.nulls import design_of
 
-        return close_loop(experiment, LoopOptions(seed=seed, bank=self.bank))
+        bank = None if self.bank is None else self.bank / design_of(experiment)
+        return close_loop(experiment, LoopOptions(seed=seed, bank=bank))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,6 +27,7 @@ from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownName
 from flagdata.recipes.documents import read_json
 from flagdata.recipes.shelves import is_name
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack, as_seen
+from measure.trajectories.trajectory import AREA_WEIGHT_UNCERTAINTY
 from sim.cloth.handles import corners
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
@@ -240,6 +241,7 @@ def read_set(folder: Path) -> Experiment:
             stiffness=flag["pin_stiffness"],
             gravity=tuple(flag["gravity"]),
             anchors_given=False,
+            area_weight_uncertainty=float(flag.get("area_weight_sigma", AREA_WEIGHT_UNCERTAINTY)),
         )
         recordings = tuple(
             Trajectory(

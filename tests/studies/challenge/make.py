@@ -225,9 +225,11 @@ def _write_markers(
         noise = stream(seed, key.name, "noise", index).normal(0.0, 1.0, tracked.shape)
         positions[name] = (tracked + key.noise * noise).astype(np.float32)
     pins = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, recipe.height]]) + place
+    sigma = recipe.weight_sigma(material=key.material, rate=key.rate, noise=key.noise)
     about = {
         "schema": "flagdata.challenge-set/1",
         "flag": {
+            **({"area_weight_sigma": sigma} if sigma else {}),
             "material": key.material,
             "width": recipe.width,
             "height": recipe.height,

@@ -1,140 +1,104 @@
-"""Null recordings for the sets of a challenge, by what every participant knows of them."""
+"""Null recordings for the sets of a challenge: of each design its own, by what every participant
+knows of it."""
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from flagdata.core.files.outputs import check_folder
 from flagdata.core.provenance import code_version, recipe_hash
-from flagdata.core.rng import child_seed, stream
-from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.core.rng import child_seed
+from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Lake
 from flagdata.recipes.documents import read_json
-from measure.forecasting import Cut, Setting
-from measure.nulls import NullBatch, null_plan
-from measure.nulls import bank as banks
-from measure.trajectories import Specimen
+from measure.forecasting import Setting
+from measure.nulls import NullBatch, null_plan, winds
+from measure.trajectories import Experiment
 from measure.trajectories import experiment_recipe as recipes
-from sim.cloth import handles
-from sim.cloth.material import named_material
-from sim.cloth.mesh import grid
-from tests.studies.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
-from tests.studies.challenge.meshes import layout
-from tests.studies.challenge.recipe import ChallengeRecipe, load
+from tests.studies.challenge.folder import ChallengeFolder, write_json
 
 
-def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[NullBatch]:
-    """For an amortised null: so many meshes and methods, each with its cloth, rate, noise and
-    layout of markers.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DesignNulls:
+    """Nulls of one design, not simulated yet.
 
-    Of the recipe its cloths, markers, rates, noises and winds are used. Its numerics are not: those
-    are the truth's.
-
-    Args:
-        seed: of all that is drawn; not the challenge's.
-
-    Raises:
-        InputError: recordings too short for a segment.
+    Attributes:
+        folder: that they are built into.
+        title: of what they are made from.
+        recipe: hash of all that shapes them.
+        batches: one a kind.
     """
-    mesh = grid(width=recipe.width, height=recipe.height, columns=MODEL_COLUMNS, rows=MODEL_ROWS)
-    held = handles.corners(mesh.rest)
-    along_pole = np.array([(0.0, 0.0, HEIGHT + mesh.rest[vertex, 1]) for vertex in held])
-    speeds = banks.around(recipe.speed.low, recipe.speed.high)
-    made: list[NullBatch] = []
-    for index in range(kinds):
-        own = child_seed(seed, "null", index)
-        rng = stream(own, "design")
-        rate = float(recipe.rates[int(rng.integers(len(recipe.rates)))])
-        noise = recipe.noises[int(rng.integers(len(recipe.noises)))]
-        frames = round(recipe.duration * rate)
-        cut = Cut.of(rate, frames)
-        if not cut.enough:
-            raise InputError(
-                f"recordings of {recipe.duration:g} s are too short",
-                where=recipe.title,
-                fix="let them last for 10 s",
-            )
-        specimen = Specimen(
-            mesh=mesh,
-            material=named_material(recipe.materials[index % len(recipe.materials)]),
-            held=held,
-            anchors=along_pole,
-            stiffness=handles.ARCSIM_STIFFNESS,
-            anchors_given=False,
-        )
-        made.append(
-            banks.prior_batch(
-                specimen,
-                markers=layout(recipe, stream(own, "layout")),
-                rate=rate,
-                noise=noise,
-                speeds=speeds,
-                duration=cut.lasting(banks.segments_of_each(recipe.count * cut.segments(frames))),
-                seed=own,
-            )
-        )
-    return made
 
-
-@dataclass(frozen=True, kw_only=True)
-class Origin:
-    """What nulls are made from: a recipe's title, and the hash of all that shapes them."""
-
+    folder: Path
     title: str
     recipe: str
+    batches: list[NullBatch]
 
 
-def nulls_of(
-    recipe: str, *, seed: int, kinds: int, lake: Lake | None
-) -> tuple[Origin, list[NullBatch]]:
-    """The nulls of a challenge's recipe, or of the recordings that a recipe of close-loop names.
+def design_of(experiment: Experiment) -> str:
+    """Names what a set's nulls have to share with it: the nominal cloth, rate and noise, and
+    whether its wind varies. Markers are the same in all sets of a challenge."""
+    recordings = experiment.recordings
+    wind = "varying" if any(winds.fluctuates(own) for own in recordings) else "steady"
+    noise = max(own.noise for own in recordings)
+    return f"{experiment.specimen.material.name}-{recordings[0].rate:g}hz-{1e3 * noise:g}mm-{wind}"
+
+
+def nulls_of_sets(
+    folder: Path, challenge: ChallengeFolder, *, seed: int, kinds: int
+) -> list[DesignNulls]:
+    """The nulls of each design among a challenge's sets, over the winds of all its sets, each in a
+    folder of its own.
+
+    Raises:
+        UsageError: sets of films.
+        FlagdataError: as `ChallengeFolder.experiment`.
+    """
+    if challenge.filmed:
+        raise UsageError(
+            "films need no bank: their simulations are kept as the first set is judged",
+            where=f"--sets {challenge.path}",
+            fix="run `python -m tests.studies challenge run` with --bank, the folder to keep them in",
+        )
+    settings: dict[str, list[Setting]] = {}
+    for name in challenge.names():
+        experiment = challenge.experiment(name)
+        settings.setdefault(design_of(experiment), []).append(Setting.of(experiment))
+    title = challenge.manifest()["title"]
+    return [
+        DesignNulls(
+            folder=folder / design,
+            title=f"{title}: {design}",
+            recipe=recipe_hash({"sets": [null_plan.design_hash(one) for one in alike]}),
+            batches=null_plan.batches(*alike, kinds=kinds, seed=child_seed(seed, design)),
+        )
+        for design, alike in sorted(settings.items())
+    ]
+
+
+def nulls_of_recordings(
+    folder: Path, recipe: Path, *, seed: int, kinds: int, lake: Lake | None
+) -> DesignNulls:
+    """The nulls of the recordings that a recipe of close-loop names.
 
     Args:
         lake: that artifacts are read from; None where there is none.
 
     Raises:
-        UsageError: a recipe of films.
-        FlagdataError: as the readers of either.
+        FlagdataError: as the reader of such recipes.
     """
-    path = Path(recipe)
-    if not (path.suffix == ".toml" and path.is_file() and _of_recordings(path)):
-        loaded = load(recipe)
-        if loaded.films is not None:
-            raise UsageError(
-                "films need no bank: their simulations are kept as the first set is judged",
-                where=f"--recipe {recipe}",
-                fix="run `python -m tests.studies challenge run` with --bank, the folder to keep "
-                "them in",
-            )
-        made = null_batches(loaded, seed=seed, kinds=kinds)
-        return Origin(title=loaded.title, recipe=recipe_hash(_content(loaded))), made
-    experiment = recipes.load(path)
+    experiment = recipes.load(recipe)
     setting = Setting.of(recipes.read(experiment, lake).experiment)
-    origin = Origin(title=experiment.title, recipe=null_plan.design_hash(setting))
-    return origin, null_plan.batches(setting, kinds=kinds, seed=seed)
+    return DesignNulls(
+        folder=folder,
+        title=experiment.title,
+        recipe=null_plan.design_hash(setting),
+        batches=null_plan.batches(setting, kinds=kinds, seed=seed),
+    )
 
 
-def _content(recipe: ChallengeRecipe) -> dict[str, Any]:
-    """What nulls of markers are made from: as before there were films, so that older folders are
-    known again."""
-    return {name: value for name, value in asdict(recipe).items() if name != "films"}
-
-
-def _of_recordings(path: Path) -> bool:
-    """Whether a recipe names recordings, as those of close-loop do and those of challenges do
-    not."""
-    try:
-        return isinstance(tomllib.loads(path.read_text(encoding="utf-8")).get("recording"), list)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
-        return False  # the challenge's reader says what is wrong with it
-
-
-def claim(folder: Path, origin: Origin, *, seed: int) -> None:
+def claim(nulls: DesignNulls, *, seed: int) -> None:
     """Note what the nulls of a folder are made from, so that a build that was stopped goes on with
     the same.
 
@@ -142,7 +106,7 @@ def claim(folder: Path, origin: Origin, *, seed: int) -> None:
         ConflictError: the folder's are of another recipe or seed, or the folder holds something
             else.
     """
-    made = {"recipe": origin.recipe, "title": origin.title, "seed": seed}
+    folder, made = nulls.folder, {"recipe": nulls.recipe, "title": nulls.title, "seed": seed}
     path = folder / "bank.json"
     if not path.exists():
         check_folder(folder)

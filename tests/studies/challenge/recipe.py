@@ -7,7 +7,12 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
     [composition]     null, one, pair, outside: shares of the sets
     [flag]            width, height, materials: names; density, bending: ranges of factors on the nominal material
     [recordings]      count, duration, settle, apart [m/s]; rates, noises: dealt out evenly; speed: a range
-    [log]             share: of the sets whose wind varies; rate; intensity: a range; length: integral scale
+    [designs.NAME]    material, rate, noise, in place of the flag's materials and the recordings' rates and noises: sets
+                      are dealt out evenly among designs, each of which has nulls of its own;
+                      weight-sigma: standard error of the stated area weight (a share), from which the true one differs
+                      in place of the flag's density; intensity: a range, where the wind varies and is logged
+    [log]             share: of the sets whose wind varies, 0 beside designs; rate; intensity: a range;
+                      length: integral scale
     [markers]         columns, rows; jitter: as a share of the spacing; one pattern for all sets
     [films]           where it is there, sets are films in place of markers, and share their winds and what is stated of
                       the camera's place; angles in degrees. rate, width, pixels-high, view: angle of the picture's
@@ -134,6 +139,17 @@ class Filming:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SetDesign:
+    """What sets of one design share; attributes as in the module's description."""
+
+    material: str
+    rate: Count
+    noise: NotNegative
+    weight_sigma: NotNegative = 0.0
+    intensity: _Draw | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Strengths:
     """Strengths at which one effect is set.
 
@@ -194,6 +210,7 @@ class ChallengeRecipe:
     effects: dict[str, Strengths]
     outside: dict[str, Strengths]
     films: Filming | None = None
+    designs: dict[str, SetDesign] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.materials or not self.rates or not self.noises or not self.numerics:
@@ -201,6 +218,13 @@ class ChallengeRecipe:
                 "materials, rates, noises or numerics are missing",
                 where=self.title,
                 fix="give at least one of each",
+            )
+        if self.designs and (self.films is not None or self.varying):
+            raise InputError(
+                "designs stand beside films, or beside a share of sets whose wind varies",
+                where=self.title,
+                fix="give designs of tracked markers alone, each with an intensity where its wind "
+                "varies",
             )
         if (self.count - 1) * self.apart > self.speed.high - self.speed.low:
             raise InputError(
@@ -236,6 +260,18 @@ class ChallengeRecipe:
                     f"{number:.3g} {what}", where=self.title, fix=f"have at most {most}"
                 )
 
+    def weight_sigma(self, *, material: str, rate: int, noise: float) -> float:
+        """Standard error of the area weight that is stated for sets of a design (a share); 0 where
+        none is."""
+        return max(
+            (
+                one.weight_sigma
+                for one in self.designs.values()
+                if (one.material, one.rate, one.noise) == (material, rate, noise)
+            ),
+            default=0.0,
+        )
+
     @property
     def ticks(self) -> int:
         """A second: every frame of every rate and every sample of the log is on one [Hz]."""
@@ -265,9 +301,21 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
 
     form = typed_tables.read(_Form, parse_recipe(text, where=where), where=where)
     flag, log, films, inside = form.flag, form.log, form.films, f"{where} [recordings]"
-    for name in flag.materials:
+    designs, materials = form.designs, flag.materials
+    for name in materials:
         material.named_material(name, where=f"{where} [flag]")
-    if films is None:
+    for name, own in designs.items():
+        material.named_material(own.material, where=f"{where} [designs] [{name}]")
+    if designs and materials:
+        raise InputError(
+            "designs and materials are given", where=f"{where} [flag]", fix="give one of them"
+        )
+    if designs:
+        run = typed_tables.read(_Recordings, form.recordings, where=inside)
+        materials = tuple(dict.fromkeys(own.material for own in designs.values()))
+        rates = tuple(own.rate for own in designs.values())
+        noises = tuple(own.noise for own in designs.values())
+    elif films is None:
         run = marked = typed_tables.read(_MarkerRecordings, form.recordings, where=inside)
         rates, noises = (
             tuple(_whole("rates", rate, where=inside) for rate in marked.rates),
@@ -281,10 +329,11 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     return ChallengeRecipe(
         title=form.title or where,
         films=films,
+        designs=dict(designs),
         composition={kind: getattr(form.composition, kind.value) for kind in Kind},
         width=flag.width,
         height=flag.height,
-        materials=flag.materials,
+        materials=materials,
         density=flag.density,
         bending=flag.bending,
         count=run.count,
@@ -318,6 +367,7 @@ class _Form:
     log: _Log
     markers: _Markers
     films: Filming | None = None
+    designs: Mapping[str, SetDesign] = field(default_factory=dict)
     numerics: Mapping[str, Numerics]
     effects: Mapping[str, Mapping[str, Any]]
     outside: Mapping[str, Mapping[str, Any]]

@@ -97,7 +97,6 @@ def test_each_refusal_names_the_command_that_comes_before(
 
 TAKEN = {
     "make": (("make", "{out}", "--seed", "1"), "mine", "conflict"),
-    "bank": (("bank", "{out}", "--seed", "1"), "mine", "conflict"),
     "score --out": (("score", "nowhere", "--out", "{out}"), "challenge-score.png", "conflict"),
     "score --history": (("score", "nowhere", "--history", "{out}/a.csv"), "a.csv", "corrupt"),
 }

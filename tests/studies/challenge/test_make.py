@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
@@ -291,6 +292,52 @@ def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
     assert len(outside) == 10
 
 
+def test_sets_are_dealt_out_among_designs_each_of_one_cloth_rate_and_noise() -> None:
+    recipe = load("registered-designs")
+    keys = draw(recipe, seed=5, count=96)
+    of_designs = Counter((key.material, key.rate, key.noise) for key in keys)
+    assert of_designs == {
+        (one.material, one.rate, one.noise): 16 for one in recipe.designs.values()
+    }
+    nulls = Counter(key.material for key in keys if key.kind is Kind.NULL)
+    assert set(nulls.values()) <= {4, 5}
+    for key in keys:
+        assert (key.intensity > 0) == (key.material == "11oz-black-denim")
+    # Half are of a stated weight, from which a cloth differs by the error of the scale.
+    weighed = [
+        math.log(key.density)
+        for key in keys
+        if recipe.weight_sigma(material=key.material, rate=key.rate, noise=key.noise)
+    ]
+    assert len(weighed) == 48
+    assert 0.02 < float(np.std(weighed)) < 0.04
+    others = [key.density for key in keys if key.material == "white-swim-solid"]
+    assert all(0.8 <= density <= 1.25 for density in others)
+    assert float(np.std(np.log(others))) > 0.06
+
+
+def test_the_weight_of_a_design_is_stated_beside_its_sets(tmp_path: Path) -> None:
+    designed = TINY.replace('materials = ["camel-ponte-roma"]\n', "")
+    designed = designed.replace("rates = [25, 60]\nnoises = [0.0, 0.001]\n", "")
+    designed = designed.replace("share = 0.5\n", "")
+    weighed = """
+[designs.only]
+material = "camel-ponte-roma"
+rate = 25
+noise = 0.001
+weight-sigma = 0.03
+"""
+    recipe = parse(designed + weighed, where="tiny")
+    made = making.make(tmp_path / "weighed", recipe, seed=3, count=1)
+    assert made.experiment("set-001").specimen.area_weight_uncertainty == 0.03
+    for wrong, message in (
+        (TINY + weighed, "designs and materials"),
+        (designed.replace("rate = 10\n", "rate = 10\nshare = 0.5\n") + weighed, "beside films"),
+    ):
+        with pytest.raises(InputError, match=message):
+            parse(wrong, where="tiny")
+
+
 def test_the_catalogs_recipes_parse() -> None:
     assert CHALLENGES.names() == (
         "films",
@@ -298,7 +345,8 @@ def test_the_catalogs_recipes_parse() -> None:
         "films-long",
         "inertia",
         "registered",
+        "registered-designs",
         "standard",
         "strong",
     )
-    assert [load(name).count for name in CHALLENGES.names()] == [3] * 7
+    assert [load(name).count for name in CHALLENGES.names()] == [3] * 8

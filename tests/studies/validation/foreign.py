@@ -86,7 +86,8 @@ def _row(truth: Truth, folder: Path, python: Path, seed: int) -> dict[str, Any]:
         if not recipe.is_file():
             write(truth, recipe.parent, python=python, seed=seed)
         observed = read(load(recipe))
-        bank = _bank(folder / "bank", observed, seed)
+        # A cloth whose own weight is declared is another design: its verdict simulates nulls itself.
+        bank = None if weighed else _bank(folder / "bank", observed, seed)
         row = _graded(
             truth, _weighed(observed, truth, float(weighed)) if weighed else observed, bank, seed
         )
@@ -127,7 +128,7 @@ def _bank(folder: Path, observed: Observed, seed: int) -> Path:
     return folder
 
 
-def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str, Any]:
+def _graded(truth: Truth, observed: Observed, bank: Path | None, seed: int) -> dict[str, Any]:
     undeclared = truth.undeclared
     row: dict[str, Any] = {
         "name": truth.name,
