@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
@@ -23,10 +24,12 @@ class Wind:
         time: (n,) since the first sample, ascending [s].
         start: instant of the first sample, on the log's own clock, or of a recording on the common
             one [UTC ns].
-        speed: (n,) of the air over ground [m/s]; NaN where it is missing.
-        direction: (n,) blowing from, clockwise from north [rad]; NaN where it is missing or was not
-            logged.
-        channels: name → (n,) of everything that was logged, SI.
+        speed: (n,) of the air over ground [m/s]; NaN where it is missing, or flagged as what
+            averages leave out.
+        direction: (n,) blowing from, clockwise from north [rad]; NaN where `speed` is, or where it
+            was not logged.
+        channels: name → (n,) of everything that was logged, SI, flagged samples too.
+        flags: (n,) bits of `flagdata.core.schema.SampleFlag`; averages leave out `UNUSABLE`.
         sensor: the instrument.
         findings: what was noticed in the log.
     """
@@ -37,6 +40,7 @@ class Wind:
     speed: FloatArray
     direction: FloatArray
     channels: Mapping[str, FloatArray]
+    flags: NDArray[np.uint16]
     sensor: Sensor
     findings: tuple[Finding, ...] = ()
 

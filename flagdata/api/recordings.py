@@ -13,7 +13,7 @@ from flagdata.core.arguments import check_arguments
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding
-from flagdata.core.schema import Kind
+from flagdata.core.schema import UNUSABLE, Kind
 from flagdata.dataset.lake_source import AnyLake, open_source
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
@@ -243,13 +243,15 @@ def _wind(series: WindSeries, *, name: str, findings: tuple[Finding, ...] = ()) 
             fix=f"it has {', '.join(series.channels)}; look at them with flagdata ingest --sniff",
         )
     start = int(series.time[0])
-    nothing = np.full(len(series), np.nan)
+    usable = (series.flags & UNUSABLE) == 0
+    direction = series.channels.get("wind_direction", np.full(len(series), np.nan))
     return Wind(
         name=name,
         time=(series.time - start) / NANOSECONDS,
         start=start,
-        speed=speed,
-        direction=series.channels.get("wind_direction", nothing),
+        speed=np.where(usable, speed, np.nan),
+        direction=np.where(usable, direction, np.nan),
+        flags=series.flags,
         channels=series.channels,
         sensor=series.sensor,
         findings=findings,

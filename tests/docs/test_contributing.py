@@ -35,7 +35,7 @@ WALKS = (
     "A network",
     "A renderer",
 )
-LINES = 60
+LINES = 72
 """Of a page."""
 
 

@@ -14,8 +14,8 @@ Tables:
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
     [expect]                  confirmed: doubts about a draft that its user has answered (keys of
                               draft/doubts.py)
-    [[check]]                 column, values, about: cells that must be one of these texts, else the
-                              row is a fault
+    [[check]]                 column, values, about, optional: cells that must be one of these
+                              texts, else the row is a fault
 
 A recipe may leave open what the heading of the file states: see `OpenRecipe`.
 """
@@ -205,11 +205,13 @@ class CheckLayout:
         column: name or number (from 1) of the column.
         values: texts of a row that is right; any other makes it a SENSOR_FAULT.
         about: what the column is ("status", "unit").
+        optional: files without the column are read all the same, unchecked.
     """
 
     column: Column
     values: Spelled
     about: str
+    optional: bool = False
 
     def __post_init__(self) -> None:
         if not self.values:

@@ -93,6 +93,7 @@ def test_a_log_from_python_blows_about_its_mean_from_the_instant_that_is_named()
         speed=series.channels["wind_speed"],
         direction=series.channels["wind_direction"],
         channels=series.channels,
+        flags=series.flags,
         sensor=series.sensor,
     )
     flags = flagdata.simulate(**SMALL, wind={"log": wind, "log-start": 3.2, "toward": 0.4})

@@ -7,7 +7,7 @@ Beside the keys of every recipe (see sensor_recipe.py) they have
 
     described-by        whose description it follows, of a format that was never tested on a real
                         file
-    [match]             see recipe.MATCH
+    [match]             see sensor_recipe.MATCH
     [facts]             name → pattern with one group, looked for down to the first row; "{name}" in
                         texts stands for it
     [time] columns      names (those but one may be absent; a group "zone" of the pattern states the
@@ -227,6 +227,8 @@ def complete(
         raise InputError("there are no rows below the heading", where=at_rows, fix="export again")
     form, about_time = _format(data["time"], stamped, heading, rows, options, at_rows)
     time = {"columns": stamped, "format": form, **({"zone": zone} if zone else {})}
+    checks = _checks(data.get("check", ()), heading, where=where)
+    checked = {check["column"] for check in checks}
     facts |= {channel: column.name for channel, column in taken.items()}
     channels: dict[str, dict[str, Any]] = {}
     for name, column in taken.items():
@@ -243,7 +245,7 @@ def complete(
             data.get("file", {}), heading, [column.number - 1 for column in taken.values()], rows
         ),
         "sensor": _sensor(data["sensor"], facts),
-        "check": _checks(data.get("check", ()), heading),
+        "check": checks,
     }
     match = data.get("match", {})
     begins = (
@@ -253,7 +255,7 @@ def complete(
         recipe=recipes.of_data(closed, where=where),
         data=closed,
         channels=taken,
-        unread=unread,
+        unread=tuple(column for column in unread if column.number not in checked),
         rivals=rivals,
         findings=(*about_time, *units.notes),
         inferred=units.inferred,
@@ -419,13 +421,30 @@ def _sensor(sensor: Mapping[str, Any], facts: Mapping[str, str]) -> dict[str, An
     return {**sensor, **{key: value for key, value in texts.items() if key != "height"}, **height}
 
 
-def _checks(checks: Sequence[Mapping[str, Any]], heading: Heading) -> list[dict[str, Any]]:
-    """Selects the checks of columns that the file has."""
+def _checks(
+    checks: Sequence[Mapping[str, Any]], heading: Heading, *, where: str
+) -> list[dict[str, Any]]:
+    """Numbers the columns that are checked, of those that the file has.
+
+    Raises:
+        InputError: a column is not there, and its check is not optional.
+    """
     present: list[dict[str, Any]] = []
     for check in checks:
-        column = check["column"]
-        column = heading.cells.index(column) + 1 if column in heading.cells else column
-        present.extend([{**check, "column": column}] if isinstance(column, int) else [])
+        wanted = check["column"]
+        numbers = (
+            at for at, cell in enumerate(heading.cells, 1) if fits(str(wanted), cell) is not None
+        )
+        number = wanted if isinstance(wanted, int) else next(numbers, None)
+        if number is not None:
+            present.append({**check, "column": number})
+        elif not check.get("optional"):
+            raise InputError(
+                f"no column is called {wanted}, which the recipe checks",
+                where=f"{where}, line {heading.at + 1}",
+                fix=f"correct the name, its columns are {', '.join(heading.cells)[:1000]}; or set "
+                "optional = true in its [[check]]",
+            )
     return present
 
 

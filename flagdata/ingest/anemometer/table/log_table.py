@@ -259,7 +259,9 @@ def read_table(
         },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
         checks=[
-            _Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks
+            _Check(layout=check, index=_index(check.column, rows, where))
+            for check in recipe.checks
+            if not check.optional or _is_there(check.column, rows)
         ],
         rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
     )
@@ -448,6 +450,13 @@ def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
         calm=compass.STILL if name in _SPEEDS else (),
         absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
     )
+
+
+def _is_there(column: str | int, rows: Rows) -> bool:
+    header = rows.header
+    if isinstance(column, int):
+        return header is None or column <= len(header)
+    return column in (header or ())
 
 
 def _index(column: str | int, rows: Rows, where: str) -> int:

@@ -7,9 +7,12 @@ from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import flagdata
 from flagdata.core.provenance import digest
+from flagdata.core.schema import UNUSABLE, SampleFlag
 from flagdata.errors import FlagdataError, InputError
 from flagdata.ingest import FORMATS, WindOptions, read_log
 from flagdata.ingest.anemometer.formats import described
@@ -161,3 +164,35 @@ def test_a_recipe_of_the_catalogs_kind_may_be_given_for_a_file_that_no_format_cl
     assert log.series.channels["wind_speed"] == pytest.approx([5.0])
     with pytest.raises(InputError, match="no heading"):
         read_log(log_file("a,b\n1,2\n"), WindOptions(recipe=own, zone="UTC"))
+
+
+STATE = RECIPE + '[[check]]\ncolumn = "state.*"\nvalues = ["ok"]\nabout = "state"\n'
+STATED = (
+    "time,Wind Speed,State of it\n2026-05-01T12:00:00Z,10,ok\n2026-05-01T12:00:01Z,90,E\n"
+    "2026-05-01T12:00:02Z,11,ok\n"
+)
+
+
+def test_rows_that_a_check_marks_are_kept_and_have_no_speed_in_python(log_file: Write) -> None:
+    path, recipe = log_file(STATED), log_file(STATE, "mast.toml")
+    wind = flagdata.wind(path, sensor=recipe)
+    assert np.isnan(wind.speed).tolist() == [False, True, False]
+    assert (wind.flags & UNUSABLE != 0).tolist() == [False, True, False]
+    # the recipe's gain of 2
+    assert wind.channels["wind_speed"] == pytest.approx(np.array([20.0, 180.0, 22.0]) * 1852 / 3600)
+    assert "columns-not-read" not in {finding.kind for finding in wind.findings}
+
+
+@pytest.mark.parametrize("name", ["statt", "State"])
+def test_a_check_of_a_column_that_is_not_there_is_refused_unless_it_is_optional(
+    log_file: Write, name: str
+) -> None:
+    misspelt = STATE.replace("state.*", name)
+    with pytest.raises(InputError, match=f"called {name}, which the recipe checks") as caught:
+        read_log(log_file(STATED), WindOptions(recipe=str(log_file(misspelt, "misspelt.toml"))))
+    assert "State of it" in str(caught.value.fix)
+    assert caught.value.where.endswith("line 1")
+    optional = log_file(f"{misspelt}optional = true\n", "optional.toml")
+    log = read_log(log_file(STATED), WindOptions(recipe=str(optional)))
+    assert not (log.series.flags & SampleFlag.SENSOR_FAULT).any()
+    assert "columns-not-read" in {finding.kind for finding in log.findings}
