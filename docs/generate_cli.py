@@ -1,5 +1,5 @@
-"""The reference of the command line, docs/cli.md and a page a group of verbs beside it, from the
-commands themselves: `python -m docs.generate_cli`."""
+"""The reference of the command line, docs/cli.md and a page a question beside it, from the commands
+themselves: `python -m docs.generate_cli`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,28 @@ from flagdata.verbs.verb_options import LongCommand
 
 PAGE = Path(__file__).with_name("cli.md")
 FOLDER = Path(__file__).with_name("cli")
+PAGES = {
+    "ingest": ("bringing recordings in", ("ingest", "recover")),
+    "clocks": ("film and wind on one clock", ("align", "realign")),
+    "declare": ("what somebody knows of a film", ("declare", "declare-cloths")),
+    "look": (
+        "what a lake holds",
+        ("ls", "show", "lineage", "view", "query", "log", "diff", "du", "catalog"),
+    ),
+    "measure": ("what a film shows", ("measure", "observe")),
+    "calibrate": ("what a cloth weighs", ("calibrate",)),
+    "close-loop": ("what the cloth model lacks", ("close-loop", "propose")),
+    "simulate": ("simulation", ("simulate",)),
+    "learn": ("data sets and networks", ("build", "train", "evaluate")),
+    "versions": (
+        "versions of a lake",
+        ("init", "tag", "branch", "merge", "label", "withdraw", "expire"),
+    ),
+    "copies": ("exports and copies", ("export", "push", "pull", "clone")),
+    "upkeep": ("keeping a lake whole", ("verify", "doctor", "heal", "gc")),
+    "project": ("this installation", ("demo", "blender-setup", "completion", "help")),
+}
+"""Page → what it is about, and its verbs."""
 _HEAD = """\
 # Commands
 
@@ -40,24 +62,26 @@ def commands() -> Iterator[tuple[str, click.Command]]:
 
 
 def pages() -> dict[Path, str]:
-    """The pages with their text: the list of all commands, and one page a group."""
+    """The pages with their text: the list of all commands, and one page a question."""
+    page_of = {verb: page for page, (_, verbs) in PAGES.items() for verb in verbs}
     listed = [_HEAD, "| | command | what it does |\n|---|---|---|"]
-    found: dict[Path, str] = {}
     for group, (title, verbs) in GROUPS.items():
         rows = [
-            f"[`{verb}`](cli/{group}.md#flagdata-{verb}) | {about} |"
+            f"[`{verb}`](cli/{page_of[verb]}.md#flagdata-{verb}) | {about} |"
             for verb, (_, about) in verbs.items()
         ]
         starts = (f"**{group}**: {title}", *[""] * (len(rows) - 1))
         listed[-1] += "".join(
             f"\n| {start} | {row}" for start, row in zip(starts, rows, strict=True)
         )
+    sections: dict[str, list[str]] = {}
+    for name, command in commands():
+        sections.setdefault(page_of[name.split(" ")[1]], []).append(_section(name, command))
+    found = {PAGE: "\n".join(listed) + "\n"}
+    for page, (title, _) in PAGES.items():
         head = f"# Commands: {title}\n\n[All commands](../cli.md), and what they have in common.\n"
-        sections = [
-            _section(name, command) for name, command in commands() if name.split(" ")[1] in verbs
-        ]
-        found[FOLDER / f"{group}.md"] = "\n".join([head, *sections])
-    return {PAGE: "\n".join(listed) + "\n"} | found
+        found[FOLDER / f"{page}.md"] = "\n".join([head, *sections[page]])
+    return found
 
 
 def _section(name: str, command: click.Command) -> str:

@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.answer.charts import Chart
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from markupsafe import Markup
 
+_INSTANTS = "nanoseconds since 1970-01-01"
+"""Unit of instants in a Zarr folder, from which xarray makes them."""
 Cell: TypeAlias = "str | Markup | Quantity | Sequence[str] | None"
 """A cell of a table: text, a part of a page, a quantity with its interval, lines of which the first
 is the value and the others belong to it, or nothing."""
@@ -189,6 +192,33 @@ class Answer:
         write_file(Path(path), self.page, command=self.question)
         return Path(path)
 
+    def save_zarr(self, folder: Path | str) -> Path:
+        """Write its arrays and its document as a new Zarr folder, which xarray opens as `to_xarray`
+        returns it. Returns its path.
+
+        Raises:
+            UsageError: it has no arrays.
+            ConflictError: something else is there.
+            FlagdataError: it cannot be written.
+        """
+        self._check_arrays()
+        import zarr
+
+        from flagdata.core.files.outputs import fresh_folder
+
+        with fresh_folder(Path(folder)) as scratch:
+            group = zarr.open_group(scratch, mode="w-", zarr_format=3)
+            coordinates = [name for name, one in self.arrays.items() if one.coordinate]
+            document = {"document": dict(self.document), "coordinates": " ".join(coordinates)}
+            group.update_attributes({**self._about, **document})
+            for name, one in self.arrays.items():
+                values, units = one.values, one.unit
+                if values.dtype.kind == "M":
+                    values, units = values.astype("datetime64[ns]").astype(np.int64), _INSTANTS
+                array = group.create_array(name, data=values, dimension_names=one.dimensions)
+                array.update_attributes({"units": units, "long_name": one.about})
+        return Path(folder)
+
     def to_xarray(self) -> xr.Dataset:
         """Return its arrays as a data set, with units and meanings as attributes.
 
@@ -196,10 +226,7 @@ class Answer:
             UsageError: it has none.
             MissingExtraError: xarray is not installed.
         """
-        if not self.arrays:
-            raise UsageError(
-                "the answer has no arrays", where=self.subject, fix="take its `quantities`"
-            )
+        self._check_arrays()
         from flagdata.core.extras import explaining_missing
 
         with explaining_missing():
@@ -212,8 +239,18 @@ class Answer:
             for name, one in self.arrays.items()
         }
         coordinates = {name for name, one in self.arrays.items() if one.coordinate}
-        about = {"question": self.question, "subject": self.subject, "answer": self.sentence}
-        return xr.Dataset(variables, attrs=about).set_coords(coordinates)
+        return xr.Dataset(variables, attrs=self._about).set_coords(coordinates)
+
+    @property
+    def _about(self) -> dict[str, str]:
+        """What a data set of it states."""
+        return {"question": self.question, "subject": self.subject, "answer": self.sentence}
+
+    def _check_arrays(self) -> None:
+        if not self.arrays:
+            raise UsageError(
+                "the answer has no arrays", where=self.subject, fix="take its `quantities`"
+            )
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.sentence})"

@@ -149,8 +149,10 @@ class Measured(Answer):
         Raises:
             MissingExtraError: xarray is not installed.
         """
-        self._along(WINDOW)
         return super().to_xarray()
+
+    def _check_arrays(self) -> None:
+        self._along(WINDOW)
 
     def _along(self, dimension: str) -> Mapping[str, Array]:
         if not self.arrays:

@@ -78,7 +78,7 @@ class MeasureCommand(AsJson, Measuring, Keeping):
         metavar="FILE.html",
     )
     zarr: Path | None = option(
-        "Write draws and series as a Zarr data set.",
+        "Write draws and windows as a Zarr data set.",
         default=None,
         section=WRITTEN,
         type=LocalPath(),
@@ -181,11 +181,11 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
-        from flagdata.core.files.outputs import fresh_folder, write_file
+        from flagdata.core.files.outputs import write_file
         from flagdata.lake.results import place_result
         from measure.commands.measure_film import answer_of, run
         from measure.commands.measurement_artifact import artifact as artifact_of
-        from measure.commands.measurement_artifact import keep, write
+        from measure.commands.measurement_artifact import keep
         from measure.estimate.wind_by_window import beside
 
         estimator = self.network.estimator
@@ -252,8 +252,8 @@ class _Job:
             )
 
         if self.chosen.zarr is not None and reported:
-            with writing("its Zarr folder"), fresh_folder(self.chosen.zarr) as scratch:
-                write(scratch, measured, series, refinement_values)
+            with writing("its Zarr folder"):
+                answer.save_zarr(self.chosen.zarr)
         if self.chosen.report is not None and text is not None:
             with writing("its report"):
                 write_file(self.chosen.report, text, command="measure")

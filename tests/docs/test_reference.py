@@ -13,6 +13,7 @@ import pytest
 import flagdata
 from docs import generate_cli, generate_effects, generate_glossary
 from flagdata.answer import Answer, Quantity
+from flagdata.cli import VERBS
 from flagdata.ingest import FileLayout, QualityRules
 from flagdata.ingest.anemometer.sensor_recipe import (
     MATCH,
@@ -56,6 +57,14 @@ def test_every_call_has_a_row_with_its_lines_and_a_section() -> None:
     assert re.findall(
         r"^## (\w+)\n\n::: flagdata\.(?:api\.\w+\.)?(\w+)$", page, flags=re.MULTILINE
     ) == [(n, n) for n in rows]
+
+
+def test_each_page_of_the_commands_answers_one_question() -> None:
+    pages = generate_cli.pages()
+    assert max(text.count("\n") for text in pages.values()) <= 200
+    assert sorted(verb for _, verbs in generate_cli.PAGES.values() for verb in verbs) == sorted(
+        VERBS
+    )
 
 
 def test_every_command_and_every_option_has_a_sentence() -> None:

@@ -433,8 +433,13 @@ def test_a_wind_series_is_a_table_and_a_data_set(
     assert len(rows) == 7
     assert {float(row["anemometer"]) for row in rows} == {4.0}
     with xarray.open_zarr(target, consolidated=False) as data:
-        np.testing.assert_allclose(data["wind"], [float(row["wind"]) for row in rows], rtol=1e-5)
-        assert data["draws"].dims == ("draw", "target")
+        winds = [float(row["wind"]) for row in rows]
+        np.testing.assert_allclose(data["wind_speed"], winds, rtol=1e-3)
+        assert data["wind_speed"].attrs["units"] == "m/s"
+        assert data["wind_speed_draws"].dims == ("draw",)
+        assert set(data.coords) == {"start", "end", "time"}
+        assert data["time"].dtype.kind == "M"
+        assert data.attrs["document"]["film"] == data.attrs["subject"] == "made-1"
 
 
 @pytest.mark.parametrize(
