@@ -258,6 +258,6 @@ class Answer:
     def _repr_html_(self) -> str:
         from flagdata.core.html import table
 
-        rows = {name.replace("_", " "): one.text for name, one in self.quantities.items()}
+        rows = {one.title: one.text for one in self.quantities.values()}
         found = {f"{one.severity.value} {one.kind}": one.what for one in self.findings}
         return table(self.sentence, rows | found)

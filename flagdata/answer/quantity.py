@@ -18,6 +18,35 @@ def unit_as_read(unit: str) -> tuple[str, float]:
     return READ_AS.get(unit, (unit, 1.0))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """How a quantity is shown to people whose name, unit or scale is another in tables.
+
+    Attributes:
+        title: what they call it.
+        unit: "1" of a ratio.
+        digits: behind the point; None for two digits in all.
+        convert: makes the number that they read.
+    """
+
+    title: str
+    unit: str
+    digits: int | None = None
+    convert: Callable[[float], float] = float
+
+    def number(self, value: float) -> str:
+        """Writes a value of the quantity."""
+        shown = self.convert(value)
+        if self.digits is not None:
+            return f"{shown:.{self.digits}f}"
+        return f"{float(f'{shown:.1e}'):g}"
+
+    @property
+    def suffix(self) -> str:
+        """The unit behind a number, with the space before it."""
+        return "" if self.unit == "1" else f" {self.unit}"
+
+
 class Bound(StrEnum):
     """Which side of a quantity is known where only one is, or neither."""
 
@@ -92,6 +121,7 @@ class Quantity:
         constrained: whether the recording adds anything to that.
         given: whether it was given.
         information: what the recording adds [nat]; None where that is not counted.
+        form: in which people read it; None where that follows from its name and unit.
     """
 
     JSON_NAMES: ClassVar[tuple[str, ...]] = (
@@ -117,6 +147,12 @@ class Quantity:
     constrained: bool = True
     given: bool = False
     information: float | None = None
+    form: Form | None = None
+
+    @property
+    def title(self) -> str:
+        """What people call it."""
+        return self.name.replace("_", " ") if self.form is None else self.form.title
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -141,11 +177,16 @@ class Quantity:
     @property
     def suffix(self) -> str:
         """The unit in which people read it, behind a number, with the space before it."""
+        if self.form is not None:
+            return self.form.suffix
         unit, _ = unit_as_read(self.unit)
         return {"1": "", "°": "°"}.get(unit, f" {unit}")
 
     def write(self, number: float) -> str:
-        """Writes a number of it to three digits, in the unit in which people read it."""
+        """Writes a number of it in its form, or to three digits in the unit in which people read
+        it."""
+        if self.form is not None:
+            return self.form.number(number)
         return f"{number * unit_as_read(self.unit)[1]:.3g}"
 
     @property

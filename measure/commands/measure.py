@@ -338,7 +338,7 @@ def _warn(findings: Sequence[Finding]) -> None:
 
 
 def _report(done: _Done, *, series: bool) -> None:
-    from measure.estimate.film_answer import SHORT
+    from measure.estimate.film_answer import FORMS
 
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
@@ -353,9 +353,9 @@ def _report(done: _Done, *, series: bool) -> None:
     say(f"  {measured.verdict.sentence}; the answer combines {measured.combined}{left_out}")
     truths = done.subject.known or {}
     if simulated_with := [
-        f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}"
-        for q in measured.quantities
-        if q.name in truths
+        f"{form.title} {form.convert(truths[name]):.3g}{form.suffix}"
+        for name, form in FORMS.items()
+        if name in truths and name in measured.names
     ]:
         say(f"  simulated with {', '.join(simulated_with)}")
     for finding in measured.bounds:

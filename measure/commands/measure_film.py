@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from flagdata.lake import Lake
 from flagdata.timebase import NANOSECONDS
 from measure.anemometer.anemometer_measuring import measure_by
 from measure.estimate.combine import of_model
-from measure.estimate.film_answer import SHORT, say
+from measure.estimate.film_answer import SHORT, form_of, say
 from measure.estimate.film_measuring import Measurement, Options, measure
 from measure.estimate.measurement_page import FindNeighbours, make_head, make_sections
 from measure.estimate.named_cloth import weight_of
@@ -172,7 +172,7 @@ def answer_of(
     series = beside(measurement, start=subject.film.start, wind=wind)
     elsewhere = wind_elsewhere(measurement, chosen)
     refined = () if refinement is None else (refinement_section(refinement),)
-    quantities = {quantity.name: quantity for quantity in measurement.quantities}
+    quantities = {one.name: replace(one, form=form_of(one)) for one in measurement.quantities}
     if measurement.gusts is not None:
         quantities[GUSTS] = measurement.gusts.intensity
     tone = Tone.SETTLED if quantities["wind_speed"].constrained else Tone.OPEN

@@ -4,10 +4,11 @@ clip"."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from flagdata.answer import Bound, Quantity, Span
+from flagdata.answer.quantity import Form
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.stated import Stated
@@ -20,35 +21,6 @@ LEAST_INFORMATION = 0.05
 [nat]. Below it the film
 did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation
 or more."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Form:
-    """How a quantity of a network is shown to people.
-
-    Attributes:
-        title: what they call it.
-        unit: "1" of a ratio.
-        digits: behind the point; None for two digits in all.
-        convert: makes the number of the network's.
-    """
-
-    title: str
-    unit: str
-    digits: int | None = None
-    convert: Callable[[float], float] = float
-
-    def number(self, value: float) -> str:
-        """Writes a value of the network's."""
-        shown = self.convert(value)
-        if self.digits is not None:
-            return f"{shown:.{self.digits}f}"
-        return f"{float(f'{shown:.1e}'):g}"
-
-    @property
-    def suffix(self) -> str:
-        """The unit behind a number, with the space before it."""
-        return "" if self.unit == "1" else f" {self.unit}"
 
 
 FORMS = {

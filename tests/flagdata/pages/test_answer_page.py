@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from markupsafe import Markup
 
-from flagdata.answer import Answer, Figure, Gallery, Head, Quantity, Section, Span, Table, Tone
+from flagdata.answer import (
+    Answer,
+    Array,
+    Figure,
+    Gallery,
+    Head,
+    Quantity,
+    Section,
+    Span,
+    Table,
+    Tone,
+)
 from flagdata.answer.charts import Chart, Line, Panel
 from flagdata.core.findings import Finding
-from flagdata.errors import ConflictError
+from flagdata.errors import ConflictError, UsageError
 
 WIND = Quantity(
     name="wind_speed",
@@ -111,3 +124,26 @@ def test_a_page_is_saved_in_place_of_an_earlier_one_and_of_nothing_else(tmp_path
     with pytest.raises(ConflictError):
         _answer().save(other)
     assert other.read_text() == "mine"
+
+
+def test_the_arrays_that_are_saved_are_those_that_xarray_has(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    times = np.array(["2026-05-01T12:00:00", "2026-05-01T12:00:01.5"], dtype="datetime64[ns]")
+    arrays = {
+        "time": Array(dimensions=("window",), values=times, unit="", coordinate=True),
+        "wind": Array(
+            dimensions=("window",), values=np.array([np.nan, np.inf]), unit="m/s", about="its wind"
+        ),
+        "draws": Array(dimensions=("draw",), values=np.arange(3.0)),
+    }
+    answer = replace(_answer(), arrays=arrays, document={"wind": None})
+    folder = answer.save_zarr(tmp_path / "answer.zarr")
+    with xarray.open_zarr(folder, consolidated=False) as read:
+        xarray.testing.assert_equal(read.load(), answer.to_xarray())
+        assert read["wind"].attrs == {"units": "m/s", "long_name": "its wind"}
+        assert read.attrs["document"] == {"wind": None}
+    with pytest.raises(ConflictError):
+        answer.save_zarr(folder)
+    with pytest.raises(UsageError, match="no arrays"):
+        _answer().save_zarr(tmp_path / "none.zarr")
+    assert not (tmp_path / "none.zarr").exists()

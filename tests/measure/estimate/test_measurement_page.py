@@ -106,6 +106,18 @@ def test_every_quantity_has_a_row_in_a_unit_that_people_use(
     assert "log10" not in words(page)
 
 
+def test_a_notebook_shows_the_quantities_of_the_page(found: Measurement, model: Estimator) -> None:
+    answer = answered(found, model)
+    shown = words(answer._repr_html_())
+    assert not re.search(r"log|scale|aspect|N·m(?<!µN·m)", shown.removeprefix(answer.sentence))
+    for quantity, title in zip(answer.quantities.values(), ("wind", "area weight"), strict=False):
+        assert quantity.title == title
+        assert f"{title} {quantity.text}" in shown
+    bending = replace(answer.quantities["bending_scale"], value=-4.0, constrained=True)
+    span = replace(bending.span, low=-4.3, high=-3.5, bound=None)
+    assert replace(bending, span=span).text == "100 [50, 320] µN·m"
+
+
 def test_a_wind_from_elsewhere_is_compared_on_the_page_too(
     found: Measurement, model: Estimator
 ) -> None:
