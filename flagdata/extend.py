@@ -36,6 +36,9 @@ _PLACES = {
     "AIR_DENSITY": "sim.effects.quantities:AIR_DENSITY",
     "Cloth": "sim.cloth.cloth_batch:Cloth",
     "face_wind": "sim.cloth.air:face_wind",
+    "Need": "sim.effects.weighing:Need",
+    "Copied": "sim.effects.weighing:Copied",
+    "CLASSES": "sim.effects.weighing:CLASSES",
     # formats of wind logs
     "Format": "flagdata.ingest.anemometer.formats.log_formats:Format",
     "Head": "flagdata.ingest.anemometer.sniffing:Head",

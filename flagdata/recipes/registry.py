@@ -47,11 +47,13 @@ class Registry(Mapping[str, Any]):
         self._group = group
         self._accepts = accepts
         self._found: dict[str, list[EntryPoint]] | None = None
+        self._left_out: set[str] = set()
 
     def _entry_points(self) -> dict[str, list[EntryPoint]]:
         """Lists the entry points of each name."""
         if self._found is None:
             self._found = {}
+            self._left_out.clear()
             for entry in entry_points(group=self._group) if self._group else ():
                 self._found.setdefault(entry.name, []).append(entry)
         return self._found
@@ -96,11 +98,14 @@ class Registry(Mapping[str, Any]):
 
     def usable(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
         """Yields the entries that can be used, of some names or of all; a warning is logged of each
-        that cannot."""
+        that cannot, once."""
         for name in self if names is None else names:
             try:
                 yield name, self[name]
             except PlugInError as error:
+                if name in self._left_out:
+                    continue
+                self._left_out.add(name)
                 _LOG.warning(
                     "warning: left out: %s\n  where: %s\n  fix:   %s",
                     error.what,

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from measure.forecasting.alignment import align_experiment
-from measure.forecasting.regressors import SHAPES
 from measure.trajectories.trajectory import Experiment, Specimen
 from measure.verdict.verdict_record import Candidate, Conclusion, Verdict
 from sim.cloth import handles
@@ -95,12 +94,13 @@ def acting_effects(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str
     none."""
     strengths: dict[str, dict[str, float]] = {}
     for candidate in effects:
-        described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
+        kind = EFFECTS[candidate.effect]
+        described = kind.parameters()[candidate.parameter]
         of_effect = strengths.setdefault(candidate.effect, {})
         of_effect[candidate.parameter.replace("_", "-")] = described.nearest(
             candidate.strength.value
         )
-        of_effect.update(SHAPES.get(candidate.effect, ()))
+        of_effect.update(kind.weighed_shapes)
     return {"effects": strengths} if strengths else {}
 
 

@@ -48,11 +48,10 @@ from measure.cloth.flag_prior import (
 )
 from measure.cloth.flag_simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
 from measure.cloth.observed_recording import Observed, check_in_all
-from measure.forecasting.strengths import Strengths, all_strengths
+from measure.forecasting.strengths import Strengths, on_films
 from measure.observables.observable import WINDOW
+from sim.effects.weighing import Need
 from sim.workers import connect_workers
-
-_HOIST = "full-hoist.stiffness"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,13 +72,19 @@ class Weighable(Strengths):
 
 
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
-    """Returns the effects that are weighed for a flag: one that is held along its hoist cannot be
-    held more."""
+    """Returns the effects that are weighed for a flag: those that need nothing else."""
+    has = filmed(flag)
     return tuple(
         Weighable(column=strength.column, low=strength.low, high=strength.high)
-        for strength in all_strengths()
-        if flag.attachment == "corners" or strength.name != _HOIST
+        for strength in on_films()
+        if strength.column.possible(has)
     )
+
+
+def filmed(flag: Flag) -> frozenset[Need]:
+    """Lists what films of a flag beside a log have of that which effects need."""
+    has = {Need.FILMS, Need.STILL, Need.TURBULENCE, Need.ANCHORS}
+    return frozenset(has | ({Need.FREE_HOIST} if flag.attachment == "corners" else set()))
 
 
 FAR = 15.0

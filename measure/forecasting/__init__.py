@@ -29,6 +29,6 @@ if TYPE_CHECKING:
     )
     from measure.forecasting.segments import Cut, Segments
     from measure.forecasting.setting import Design, Setting
-    from measure.forecasting.strengths import Suspicion, all_strengths, on_markers
+    from measure.forecasting.strengths import Suspicion, on_films, on_markers, why_unweighed
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -30,7 +30,8 @@ from torch import Tensor
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import UsageError
 from measure.forecasting.calibrated_parameters import THETA, Calibration
-from measure.forecasting.regressors import DOUBLE, Column, StepColumn, WrittenColumn
+from measure.forecasting.recorded import recorded
+from measure.forecasting.regressors import Column, StepColumn, WrittenColumn
 from measure.forecasting.segments import Segments
 from measure.trajectories.interpolation import onto
 from measure.trajectories.trajectory import Specimen
@@ -223,16 +224,14 @@ class Forecaster:
         base: Tensor,
     ) -> list[Tensor]:
         """Computes the sensitivities to columns and to parameters of `THETA` by their index: steps
-        in one joint batch, those of `DOUBLE` in one of their own in double precision."""
+        in one joint batch, those of how cloth bends in one of their own in double precision."""
         steps = [
             index
             for index, parameter in enumerate(wanted)
             if not isinstance(parameter, WrittenColumn)
         ]
         exact = [
-            index
-            for index in steps
-            if self.dtype != torch.float64 and _name(wanted[index]) in DOUBLE
+            index for index in steps if self.dtype != torch.float64 and _is_double(wanted[index])
         ]
         plain = [index for index in steps if index not in exact]
         changes = dict(
@@ -268,7 +267,8 @@ class Forecaster:
     ) -> list[Tensor]:
         """Computes the sensitivities by steps; the base's errors are computed beside theirs where
         they are not given. Nothing changes with an effect that the cloth cannot have as it is
-        held."""
+        held, or that needs what is not recorded."""
+        has = recorded(self.specimen, segments.items)
         nominal = self.system(segments, calibrations)
         sizes: list[float] = []
         inapplicable: list[int] = []
@@ -281,10 +281,13 @@ class Forecaster:
                 )
             elif isinstance(parameter, StepColumn):
                 try:
-                    batches.append(parameter.system(*nominal))
+                    stepped = parameter.system(*nominal) if parameter.possible(has) else None
                 except InapplicableError:
+                    stepped = None
+                if stepped is None:
                     inapplicable.append(len(sizes) + len(inapplicable))
                     continue
+                batches.append(stepped)
                 sizes.append(parameter.step)
             else:
                 raise UsageError(
@@ -292,7 +295,7 @@ class Forecaster:
                 )
         errors = self.errors_jointly(batches, segments)
         start = errors.pop(0) if base is None else base
-        changes = [(start - stepped) / size for stepped, size in zip(errors, sizes, strict=True)]
+        changes = [(start - moved) / size for moved, size in zip(errors, sizes, strict=True)]
         for index in inapplicable:
             changes.insert(index, torch.zeros_like(start))
         return changes
@@ -334,8 +337,10 @@ class Forecaster:
         return [done[index % together][index // together] for index in range(len(batches))]
 
 
-def _name(parameter: Column | int) -> str:
-    return THETA[parameter][0] if isinstance(parameter, int) else parameter.name
+def _is_double(parameter: Column | int) -> bool:
+    if isinstance(parameter, int):
+        return THETA[parameter][0] == "bending"
+    return isinstance(parameter, StepColumn) and parameter.double
 
 
 def _tied_to_anchors(start: FloatArray, vertices: Sequence[int], anchors: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ across it, which are only looked along, are written down.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +18,6 @@ import torch
 from torch import Tensor
 
 from flagdata.core.arrays import FloatArray
-from flagdata.errors import UsageError
 from measure.forecasting.calibrated_parameters import THETA
 from sim.cloth.cloth_batch import Cloth
 from sim.cloth.state import State
@@ -27,6 +27,7 @@ from sim.effects.cloth_geometry import left_of
 from sim.effects.effect import ForceEffect
 from sim.effects.gusts import Gusts
 from sim.effects.parameter import Parameter
+from sim.effects.weighing import Need
 
 
 class Column(ABC):
@@ -49,6 +50,15 @@ class StepColumn(Column):
     """
 
     step: float
+
+    @property
+    def double(self) -> bool:
+        """Whether it is predicted in double precision."""
+        return False
+
+    def possible(self, recorded: Collection[Need]) -> bool:
+        """Returns whether recordings have what it needs."""
+        return True
 
     @abstractmethod
     def system(self, system: System, state: State) -> tuple[System, State]:
@@ -74,9 +84,14 @@ class EffectColumn(StepColumn):
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return f"{self.effect}.{self.parameter}"
 
+    @property
+    def kind(self) -> type[Effect]:
+        """The effect's class."""
+        return EFFECTS[self.effect]
+
     @cached_property
     def described(self) -> Parameter:
-        return EFFECTS[self.effect].parameters()[self.parameter]
+        return self.kind.parameters()[self.parameter]
 
     @property
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -85,7 +100,14 @@ class EffectColumn(StepColumn):
     @property
     def revision(self) -> int:
         """See `Effect`."""
-        return EFFECTS[self.effect].revision
+        return self.kind.revision
+
+    @property
+    def double(self) -> bool:
+        return self.kind.double
+
+    def possible(self, recorded: Collection[Need]) -> bool:
+        return set(self.kind.needs) <= set(recorded)
 
     def system(self, system: System, state: State) -> tuple[System, State]:
         return self.apply_strength(self.step, system, state)
@@ -99,9 +121,7 @@ class EffectColumn(StepColumn):
     def at(self, coefficient: float | Tensor) -> Effect:
         """Makes the effect at a strength `coefficient` beyond its null value, or one for each
         member (batch,)."""
-        return EFFECTS[self.effect](
-            **dict(self.shapes), **{self.parameter: self.described.null + coefficient}
-        )
+        return self.kind(**dict(self.shapes), **{self.parameter: self.described.null + coefficient})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -288,71 +308,47 @@ def cosine(mode: tuple[int, int], places: FloatArray, rest: FloatArray) -> Float
     return np.cos(np.pi * mode[0] * share[:, 0]) * np.cos(np.pi * mode[1] * share[:, 1])
 
 
-# Step of every strength that is weighed: some tenths of its expected range, where predictions are
-# near linear.
-_STEPS: tuple[tuple[str, str, float], ...] = (
-    ("power-law-drag", "exponent", 0.2),
-    ("tangential-linear-drag", "coefficient", 0.05),
-    ("tangential-quadratic-drag", "coefficient", 0.02),
-    ("lift", "coefficient", 0.3),
-    ("added-mass", "mass", 0.05),
-    ("reactive-loading", "mass", 0.03),
-    ("finite-span-loading", "share", 0.05),
-    ("air-density", "change", 0.1),
-    ("permeability", "permeability", 0.005),
-    ("hem-mass", "line_density", 0.005),
-    ("hem-stiffness", "ratio", 5.0),
-    ("vertical-wind", "inclination", 0.05),
-    ("shear", "exponent", 0.15),
-    ("pole-wake", "share", 0.4),
-    ("hysteresis", "couple", 1e-4),
-    ("rest-curvature", "curvature", 1.0),
-    ("full-hoist", "stiffness", 20.0),
-    ("tilted-pole", "lean", 0.02),
-    ("tilted-pole", "sway", 0.02),
-    ("direction-change", "angle", 0.05),
-    ("wet-mass", "uptake", 0.1),
-)
-SHAPES: dict[str, tuple[tuple[str, float], ...]] = {
-    "direction-change": (("start", -1.0), ("duration", 1e-3))
-}
-"""Of effects whose usual shape is another than what is weighed: a wind that has turned before the
-recording begins."""
 TURNED = "direction-change.angle"
 """The column of what the log's direction is off by, which is fitted within its tolerance in every
 comparison."""
-DOUBLE = frozenset(
-    {"bending", "hem-stiffness.ratio", "hysteresis.couple", "rest-curvature.curvature"}
-)
-"""Directions whose steps are simulated in double precision: those of how cloth bends. In single
-precision a prediction of 40 ms rounds to 0.2 to 1.6 µm, and these move predictions by 3 to 80 µm a
-step, less where cloth is soft, heavy or
-damped: their sensitivities were rounding to 1, 0.3, 4 and 36 %, all others' to 0.4 % or less
-(ArcSim's flag with 0.5 ms of damping). Longer steps are no way out: where rounding is below 0.5 %,
-what is not linear in the step is above."""
 
 _MODES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
 _MOTIONS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2))
 
 
 def library() -> tuple[EffectColumn, ...]:
-    """Lists the strengths that are weighed.
+    """Lists the strengths that are weighed on markers and meshes, and `TURNED`; those of installed
+    packages last."""
+    weighed = {column.name for column in weighed_columns(Need.MARKERS)}
+    return tuple(column for column in _strengths() if column.name in {*weighed, TURNED})
 
-    Raises:
-        UsageError: an entry that the registry of effects does not have.
+
+def weighed_columns(kind: Need) -> tuple[EffectColumn, ...]:
+    """Lists the strengths of the registry of effects that verdicts on a kind of recordings weigh,
+    where these have what an effect needs.
+
+    Args:
+        kind: `Need.MARKERS` or `Need.FILMS`.
     """
-    columns = tuple(
-        EffectColumn(effect=effect, parameter=name, step=step, shapes=SHAPES.get(effect, ()))
-        for effect, name, step in _STEPS
+    never = {Need.MARKERS, Need.FILMS, Need.MAST} - {kind}
+    return tuple(
+        column
+        for column in _strengths()
+        if not column.kind.unweighed and never.isdisjoint(column.kind.needs)
     )
-    for column in columns:
-        if column.parameter not in EFFECTS[column.effect].strengths():
-            raise UsageError(
-                f"{column.effect} has no strength {column.parameter!r}",
-                where="columns",
-                fix="correct the table",
-            )
-    return columns
+
+
+def _strengths() -> tuple[EffectColumn, ...]:
+    return tuple(
+        EffectColumn(
+            effect=name,
+            parameter=parameter,
+            step=effect.parameters()[parameter].small_step,
+            shapes=tuple(effect.weighed_shapes.items()),
+        )
+        for name, effect in EFFECTS.usable()
+        for parameter in effect.strengths()
+    )
 
 
 def fields() -> tuple[FieldColumn, ...]:

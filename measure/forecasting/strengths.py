@@ -1,49 +1,28 @@
-"""How strong the library's effects may be, and an effect that is suspected before recordings are
-looked at.
+"""How strong the effects may be that verdicts weigh, why the others are not weighed, and an effect
+that is suspected before recordings are looked at.
 
-The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film
-hardly shows to beyond what is expected in the field; uniform where it has two. They were fixed
-before any verdict on a film was made, that of `finite-span-loading` later, from its prior, before
-any was made with it. Verdicts on markers state their power at the same strengths.
-Not among them: a wind that is turned from its log, which has a tolerance of its own or looks like
-another view; internal damping, which is calibrated; gusts, whose course is looked at by itself.
+Each effect of the registry states its strengths (`sim.effects.parameter.strength`), those of
+installed packages as well. They are a prior: log-uniform where an effect has one sign, from what a
+minute of film hardly shows to beyond what is expected in the field; uniform where it has two. Those
+of the library were fixed before any verdict on a film was made, that of `finite-span-loading`
+later, from its prior, before any was made with it. Verdicts on markers state their power at the
+same strengths.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from flagdata.errors import UnknownNameError, UsageError
-from measure.forecasting.regressors import EffectColumn, library
+from flagdata.recipes.registry import PlugInError
+from measure.forecasting.regressors import EffectColumn, weighed_columns
+from sim.effects import EFFECTS
+from sim.effects.weighing import Need
 
 WHERE = "--suspect"
 """Where a suspicion is given."""
-_RANGES: dict[str, tuple[float, float]] = {
-    "power-law-drag.exponent": (-0.5, 0.8),
-    "tangential-linear-drag.coefficient": (0.03, 1.5),
-    "tangential-quadratic-drag.coefficient": (0.006, 0.3),
-    "lift.coefficient": (0.3, 8.0),
-    "added-mass.mass": (0.03, 0.6),
-    "reactive-loading.mass": (0.03, 0.6),
-    "air-density.change": (-0.4, 0.8),
-    "permeability.permeability": (1e-3, 5e-2),
-    "hem-mass.line_density": (4e-3, 8e-2),
-    "hem-stiffness.ratio": (3.0, 60.0),
-    "vertical-wind.inclination": (-0.4, 0.4),
-    "shear.exponent": (-0.3, 0.8),
-    "pole-wake.share": (0.2, 1.5),
-    "hysteresis.couple": (5e-5, 2e-3),
-    "rest-curvature.curvature": (-6.0, 6.0),
-    "full-hoist.stiffness": (30.0, 2e4),
-    "tilted-pole.lean": (-0.4, 0.6),
-    "tilted-pole.sway": (-0.25, 0.25),
-    "wet-mass.uptake": (0.05, 1.0),
-    "slack.length": (0.01, 0.15),
-    "finite-span-loading.share": (0.05, 1.2),
-}
-_SLACK = EffectColumn(effect="slack", parameter="length", step=0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,29 +45,58 @@ class Strengths:
 
     @property
     def signs(self) -> tuple[int, ...]:
-        """1 where it can only be stronger, 1 and −1 where it may have either sign."""
-        return (1,) if self.low > 0 else (1, -1)
+        """1 where it can be stronger, −1 where it can be less than null; both where it may have
+        either sign."""
+        return tuple(sign for sign in (1, -1) if max(sign * self.low, sign * self.high) > 0)
 
     @property
     def expected(self) -> float:
         """Mean size over the prior."""
         if self.low > 0:
             return (self.high - self.low) / math.log(self.high / self.low)
+        if self.high <= 0:
+            return -(self.low + self.high) / 2
         return (self.low**2 + self.high**2) / (2 * (self.high - self.low))
 
 
-def all_strengths() -> tuple[Strengths, ...]:
-    """Lists the strengths of all effects that have any."""
-    columns = {column.name: column for column in (*library(), _SLACK)}
+def on_markers() -> tuple[Strengths, ...]:
+    """Lists the strengths of the effects that verdicts on markers and meshes weigh."""
+    return _strengths_of(Need.MARKERS)
+
+
+def on_films() -> tuple[Strengths, ...]:
+    """Lists the strengths of the effects that verdicts on films weigh."""
+    return _strengths_of(Need.FILMS)
+
+
+def _strengths_of(kind: Need) -> tuple[Strengths, ...]:
+    columns = weighed_columns(kind)
+    ranges = [column.described.weighed_range for column in columns]
     return tuple(
-        Strengths(column=columns[name], low=low, high=high) for name, (low, high) in _RANGES.items()
+        Strengths(column=column, low=low, high=high)
+        for column, (low, high) in zip(columns, ranges, strict=True)
     )
 
 
-def on_markers() -> tuple[Strengths, ...]:
-    """Lists the strengths of the effects that verdicts on markers weigh."""
-    names = {column.name for column in library()}
-    return tuple(strengths for strengths in all_strengths() if strengths.name in names)
+def why_unweighed(recorded: Collection[Need]) -> dict[str, str]:
+    """Effect of the registry → why a verdict does not weigh it.
+
+    Args:
+        recorded: what the recordings have.
+    """
+    reasons: dict[str, str] = {}
+    for name in EFFECTS:
+        try:
+            effect = EFFECTS[name]
+        except PlugInError as error:
+            reasons[name] = error.what
+            continue
+        lacking = [
+            f"it needs {need}: {why}" for need, why in effect.needs.items() if need not in recorded
+        ]
+        if reason := effect.unweighed or "; ".join(lacking):
+            reasons[name] = reason
+    return reasons
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,17 +146,18 @@ class Suspicion:
                 f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {names}"
             )
         (strengths,) = matching
-        if strengths.low > 0 and sign < 0:
+        if sign and sign not in strengths.signs:
             raise UsageError(
-                f"{wanted} cannot be less than none",
+                f"{wanted} cannot be {'less' if sign < 0 else 'more'} than none",
                 where=WHERE,
                 fix=f"give {wanted} without the sign",
             )
-        if strengths.low < 0 and not sign:
+        usual, *others = strengths.signs
+        if others and not sign:
             raise UsageError(
                 f"{wanted} may be above or below {strengths.column.described.null:g}",
                 where=WHERE,
                 fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
             )
-        sign = sign or 1
+        sign = sign or usual
         return cls(name=strengths.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")

@@ -13,7 +13,7 @@ from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import PRIOR, THETA, Calibration
 from measure.forecasting.model import Model, errors_of, linearise_model
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import DOUBLE, Column, EffectColumn
+from measure.forecasting.regressors import Column, EffectColumn
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import NullModel
 from measure.inference.segment_evidence import Evidence
@@ -239,7 +239,7 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
 
 
 def _linearise_models(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
-    if any(column.name in DOUBLE for column, _ in model.effects):
+    if any(column.double for column, _ in model.effects):
         forecaster = forecaster.double
     base, changes = linearise_model(model, forecaster, segments)
     return reduce_errors(base, changes, segments.recording, segments.noise, segments.counted)

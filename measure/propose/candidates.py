@@ -4,15 +4,11 @@ recordings."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-
-from torch import Tensor
 
 from flagdata.errors import UnknownNameError
 from measure.forecasting.regressors import EffectColumn, library
 from sim.effects import Effect
 from sim.effects.effect_files import load
-from sim.effects.parameter import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +21,9 @@ class FileColumn(EffectColumn):
 
     spec: str
 
-    @cached_property
-    def described(self) -> Parameter:
-        return load(self.spec).parameters()[self.parameter]
-
-    def at(self, coefficient: float | Tensor) -> Effect:
-        return load(self.spec)(**{self.parameter: self.described.null + coefficient})
+    @property
+    def kind(self) -> type[Effect]:
+        return load(self.spec)
 
 
 def from_file(spec: str) -> tuple[FileColumn, ...]:

@@ -349,6 +349,10 @@ class TermColumn(EffectColumn):
         """Makes the column of a term, with the step of its field."""
         return cls(term=term, parameter=term.name, step=FIELDS[term.field].step)
 
+    @property
+    def kind(self) -> type[TermMass] | type[TermEffect]:
+        return TermMass if self.term.field == MASS else TermEffect
+
     @cached_property
     def described(self) -> Parameter:
         admissible = (
@@ -364,8 +368,7 @@ class TermColumn(EffectColumn):
         )
 
     def at(self, coefficient: float | Tensor) -> Effect:
-        kind = TermMass if self.term.field == MASS else TermEffect
-        return kind(coefficient=coefficient, term=self.term)
+        return self.kind(coefficient=coefficient, term=self.term)
 
 
 def dictionary() -> tuple[TermColumn, ...]:

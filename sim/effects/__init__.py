@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from sim.effects.slack import Slack
     from sim.effects.tangential_linear_drag import TangentialLinearDrag
     from sim.effects.vertical_wind import VerticalWind
+    from sim.effects.weighing import CLASSES, Copied, Need
 
 
 __all__ = ["EFFECTS", "SENSOR_EFFECTS", "Effect", "Parameter", "Role", "apply"]
@@ -61,30 +62,31 @@ EFFECTS = Registry(
         "reactive-loading": "sim.effects.reactive_loading:ReactiveLoading",
         "finite-span-loading": "sim.effects.finite_span_loading:FiniteSpanLoading",
         "wagner-lag": "sim.effects.wagner_lag:WagnerLag",
-        "porosity": "sim.effects.porosity:Porosity",
-        "permeability": "sim.effects.permeability:Permeability",
         "air-density": "sim.effects.air_density:AirDensityChange",
-        "internal-damping": "sim.effects.internal_damping:InternalDamping",
+        "permeability": "sim.effects.permeability:Permeability",
+        "porosity": "sim.effects.porosity:Porosity",
         "hem-mass": "sim.effects.hem_mass:HemMass",
         "hem-stiffness": "sim.effects.hem_stiffness:HemStiffness",
-        "wet-mass": "sim.effects.wet_mass:WetMass",
-        "gusts": "sim.effects.gusts:Gusts",
-        "logged-gusts": "sim.effects.logged_gusts:LoggedGusts",
-        "direction-change": "sim.effects.direction_change:DirectionChange",
         "vertical-wind": "sim.effects.vertical_wind:VerticalWind",
         "shear": "sim.effects.shear:Shear",
         "pole-wake": "sim.effects.pole_wake:PoleWake",
         "hysteresis": "sim.effects.hysteresis:Hysteresis",
         "rest-curvature": "sim.effects.rest_curvature:RestCurvature",
         "full-hoist": "sim.effects.full_hoist:FullHoist",
-        "slack": "sim.effects.slack:Slack",
         "tilted-pole": "sim.effects.tilted_pole:TiltedPole",
+        "slack": "sim.effects.slack:Slack",
+        "direction-change": "sim.effects.direction_change:DirectionChange",
+        "gusts": "sim.effects.gusts:Gusts",
+        "logged-gusts": "sim.effects.logged_gusts:LoggedGusts",
+        "wet-mass": "sim.effects.wet_mass:WetMass",
+        "internal-damping": "sim.effects.internal_damping:InternalDamping",
     },
     group="flagdata.effects",
     accepts=lambda entry: isinstance(entry, type) and issubclass(entry, Effect),
 )
-"""On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry
-points `flagdata.effects`. Of files, see `sim.effects.effect_files`."""
+"""On the cloth: kinds of `sim.effects.effect`, in the order in which verdicts weigh them; then
+those of installed packages, from the entry points `flagdata.effects`. Of files, see
+`sim.effects.effect_files`."""
 
 SENSOR_EFFECTS = Registry(
     "sensor effect",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, TypeAlias
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -12,19 +12,21 @@ from sim.cloth.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects.effect import ForceEffect
-from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.effects.parameter import NOT_NEGATIVE, Described, Value, strength
 
-MassPerArea: TypeAlias = Annotated[
-    Value,
-    strength(
+
+def mass_per_area(*, step: float) -> Described:
+    """Annotates a mass of air per area of cloth."""
+    return strength(
         unit="kg/m²",
         prior=(0.0, 0.3),
+        weighed=(0.03, 0.6),
+        step=step,
         admissible=NOT_NEGATIVE,
         source="potential flow: ρ λ/π for waves of length λ on a wide sheet, both sides, and π ρ "
         "H/4, the mean over a "
         "slender strip of height H (Lighthill 1960): 0.04–0.3 for waves of 0.1–0.8 m",
-    ),
-]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +41,8 @@ class AddedMass(ForceEffect):
         mass: m_a, per area of cloth.
     """
 
-    mass: MassPerArea = 0.0
+    effect_class: ClassVar[str] = "fluid-inertia"
+    mass: Annotated[Value, mass_per_area(step=0.05)] = 0.0
 
     def added_mass(self, cloth: Cloth) -> Tensor:
         """Computes the added mass, (vertex, batch) [kg]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -19,11 +19,14 @@ class AirDensityChange(PressureEffect):
         change: δ, relative to the base model's density.
     """
 
+    effect_class: ClassVar[str] = "dynamic-pressure"
     change: Annotated[
         Value,
         strength(
             unit="1",
             prior=(-0.25, 0.3),
+            weighed=(-0.4, 0.8),
+            step=0.1,
             admissible=(-1.0, 10.0),
             source="1.225 kg/m³ ± 15 % for −20 to 40 °C and 0 to 1,000 m (U.S. Standard Atmosphere "
             "1976), around a "

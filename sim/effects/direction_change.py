@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -12,6 +13,7 @@ from torch import Tensor
 from sim.effects.cloth_geometry import horizontal, left_of
 from sim.effects.effect import WindEffect
 from sim.effects.parameter import Value, shape, strength
+from sim.effects.weighing import Copied, Need
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +27,18 @@ class DirectionChange(WindEffect):
         duration: how long it turns.
     """
 
+    unweighed: ClassVar[str] = "the direction of a log is fitted within its own tolerance"
+    weighed_shapes: ClassVar[Mapping[str, float]] = {"start": -1.0, "duration": 1e-3}
+    effect_class: ClassVar[str] = "turbulence"
+    copied: ClassVar[Copied | None] = Copied(
+        by="the wind's direction", shown_by=Need.DIRECTION, how="a vane beside the pole"
+    )
     angle: Annotated[
         Value,
         strength(
             unit="rad",
             prior=(-0.8, 0.8),
+            step=0.05,
             admissible=(-2 * math.pi, 2 * math.pi),
             source="standard deviation of the direction over 10 min: 0.17–0.44 rad (Pasquill "
             "classes D to A)",

@@ -7,7 +7,7 @@ the last bit.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -21,6 +21,7 @@ from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects.cloth_geometry import origin
 from sim.effects.parameter import Parametrised
+from sim.effects.weighing import Copied, Need
 from sim.kernel.effect_code import Given
 from sim.wind import Wind
 
@@ -31,9 +32,27 @@ class Effect(Parametrised, ABC):
     Attributes:
         revision: raised where the same strengths act otherwise than before, so that what was
             simulated is made anew.
+        needs: what recordings have to have so that a verdict weighs it, and why.
+        unweighed: why no verdict weighs it; empty where verdicts do.
+        weighed_shapes: name → value of the shapes with which it is weighed, where they are not the
+            usual ones.
+        double: whether its small steps are predicted in double precision, as those of how cloth
+            bends are. In single precision a prediction of 40 ms rounds to 0.2 to 1.6 µm, and these
+            move predictions by 3 to 80 µm a step, less where cloth is soft, heavy or damped: their
+            sensitivities were rounding to 1, 0.3, 4 and 36 %, all others' to 0.4 % or less
+            (ArcSim's flag with 0.5 ms of damping). Longer steps are no way out: where rounding is
+            below 0.5 %, what is not linear in the step is above.
+        effect_class: of `sim.effects.weighing.CLASSES`; empty for a class of its own.
+        copied: how the base model copies it; None where it does not.
     """
 
     revision: ClassVar[int] = 1
+    needs: ClassVar[Mapping[Need, str]] = {}
+    unweighed: ClassVar[str] = ""
+    weighed_shapes: ClassVar[Mapping[str, float]] = {}
+    double: ClassVar[bool] = False
+    effect_class: ClassVar[str] = ""
+    copied: ClassVar[Copied | None] = None
 
     @abstractmethod
     def apply(self, system: System, state: State) -> tuple[System, State]:

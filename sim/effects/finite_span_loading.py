@@ -66,12 +66,15 @@ class FiniteSpanLoading(ForceEffect):
         density: ρ of the air.
     """
 
+    effect_class: ClassVar[str] = "fluid-inertia"
     revision: ClassVar[int] = 2  # the ends continued from within
     share: Annotated[
         Value,
         strength(
             unit="1",
             prior=(0.2, 1.2),
+            weighed=(0.05, 1.2),
+            step=0.05,
             admissible=NOT_NEGATIVE,
             source="1 by potential flow; a wake and the flow around the hoist take a part away: "
             "thresholds of flutter "

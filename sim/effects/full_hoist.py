@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -15,6 +16,7 @@ from sim.cloth.state import State
 from sim.cloth.system import InapplicableError, Springs, System
 from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.effects.weighing import Need
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +28,16 @@ class FullHoist(Effect):
         stiffness: of the springs on each axis, per length of hoist.
     """
 
+    needs: ClassVar[Mapping[Need, str]] = {
+        Need.FREE_HOIST: "what is held already cannot be held more"
+    }
     stiffness: Annotated[
         Value,
         strength(
             unit="N/m²",
             prior=(1e2, 2e4),
+            weighed=(30.0, 2e4),
+            step=20.0,
             admissible=NOT_NEGATIVE,
             source="loose lacing to a tight sleeve; 1e4 is the reference simulator's 1e3 N/m on "
             "vertices 0.1 m apart",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 import torch
@@ -28,6 +28,8 @@ class Gusts(WindEffect):
         samples: (n, 3, batch or 1) g, of mean 0 and variance 1 in the ensemble.
     """
 
+    unweighed: ClassVar[str] = "the course of the wind is tested by itself"
+    effect_class: ClassVar[str] = "turbulence"
     intensity: Annotated[
         Value,
         strength(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 
@@ -21,11 +21,14 @@ class HemMass(ClothEffect):
         line_density: λ, on top of the cloth.
     """
 
+    effect_class: ClassVar[str] = "hem"
     line_density: Annotated[
         Value,
         strength(
             unit="kg/m",
             prior=(0.0, 0.02),
+            weighed=(4e-3, 8e-2),
+            step=0.005,
             admissible=NOT_NEGATIVE,
             source="two more layers over 10–25 mm of cloth of 0.1–0.3 kg/m²: 0.002–0.015 kg/m; "
             "thread and tape on top",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -28,11 +28,15 @@ class HemStiffness(ClothEffect):
         width: of the strip.
     """
 
+    double: ClassVar[bool] = True
+    effect_class: ClassVar[str] = "bending"
     ratio: Annotated[
         Value,
         strength(
             unit="1",
             prior=(0.0, 26.0),
+            weighed=(3.0, 60.0),
+            step=5.0,
             admissible=NOT_NEGATIVE,
             source="three layers: 3³ − 1 = 26 where they are bonded and bend as one plate, 3 − 1 = "
             "2 where they slide",

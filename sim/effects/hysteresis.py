@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -36,11 +36,15 @@ class Hysteresis(Effect):
         curvature: α₀ over which the friction turns round.
     """
 
+    double: ClassVar[bool] = True
+    effect_class: ClassVar[str] = "bending"
     couple: Annotated[
         Value,
         strength(
             unit="N",
             prior=(0.0, 5e-4),
+            weighed=(5e-5, 2e-3),
+            step=1e-4,
             admissible=NOT_NEGATIVE,
             source="Kawabata's 2HB of 0.02–0.1 gf·cm/cm for apparel cloth (Kawabata, "
             "Standardization and Analysis of "

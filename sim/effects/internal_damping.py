@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from sim.cloth.cloth_batch import Cloth
 from sim.effects.effect import ClothEffect
@@ -19,6 +19,7 @@ class InternalDamping(ClothEffect):
         time: d; the amplitude of a vibration of angular frequency ω falls by e^(−π d ω) each cycle.
     """
 
+    unweighed: ClassVar[str] = "the cloth's damping is calibrated"
     time: Annotated[
         Value,
         strength(

@@ -33,6 +33,8 @@ class Lift(ForceEffect):
         strength(
             unit="1",
             prior=(0.0, 4.0),
+            weighed=(0.3, 8.0),
+            step=0.3,
             admissible=NOT_NEGATIVE,
             source="thin-aerofoil slope 2π, π A/2 for slender plates of aspect ratio A, less where "
             "flow separates; "

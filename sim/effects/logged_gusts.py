@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 import torch
@@ -29,6 +29,8 @@ class LoggedGusts(WindEffect):
             and up.
     """
 
+    unweighed: ClassVar[str] = "a log that resolves gusts is the base model's wind"
+    effect_class: ClassVar[str] = "turbulence"
     share: Annotated[
         Value,
         strength(

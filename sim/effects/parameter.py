@@ -27,6 +27,7 @@ Value: TypeAlias = float | Tensor
 """One number for the whole batch, or a tensor (batch,)."""
 EVERYTHING = (-math.inf, math.inf)
 NOT_NEGATIVE = (0.0, math.inf)
+_REACH = 20.0
 
 
 class Role(StrEnum):
@@ -49,6 +50,10 @@ class Described:
         prior: (low, high) of the values expected in the field.
         admissible: (least, most) of the values that make sense at all; others are refused.
         source: where the prior is from.
+        weighed: (low, high) beyond the null value of the strengths that verdicts weigh; None for
+            those of the prior.
+        step: beyond the null value, where predictions are near linear; None for a tenth of what is
+            weighed.
     """
 
     role: Role
@@ -56,6 +61,8 @@ class Described:
     prior: tuple[float, float]
     admissible: tuple[float, float]
     source: str
+    weighed: tuple[float, float] | None = None
+    step: float | None = None
 
     def admits(self, value: float) -> bool:
         """Returns whether a value makes sense at all."""
@@ -72,6 +79,23 @@ class Parameter(Described):
     """A described parameter with its null value, in the same unit."""
 
     null: float
+
+    @property
+    def weighed_range(self) -> tuple[float, float]:
+        """Returns (low, high) beyond the null value of what verdicts weigh: as stated, or the
+        prior. Of one that has one sign the least is a twentieth of the most: what a minute of film
+        hardly shows."""
+        if self.weighed is not None:
+            return self.weighed
+        low, high = (end - self.null for end in self.prior)
+        if low >= 0:
+            return max(low, high / _REACH), high
+        return (low, min(high, low / _REACH)) if high <= 0 else (low, high)
+
+    @property
+    def small_step(self) -> float:
+        """Returns the step by which its sensitivity is found, toward where more is weighed."""
+        return self.step or max(self.weighed_range, key=abs) / 10
 
     def check(self, value: Value, *, where: str) -> None:
         """Refuses what is not finite or not admissible.
@@ -106,10 +130,18 @@ def strength(
     prior: tuple[float, float],
     source: str,
     admissible: tuple[float, float] = EVERYTHING,
+    weighed: tuple[float, float] | None = None,
+    step: float | None = None,
 ) -> Described:
     """Annotates a field at whose default the effect is not there."""
     return Described(
-        role=Role.STRENGTH, unit=unit, prior=prior, admissible=admissible, source=source
+        role=Role.STRENGTH,
+        unit=unit,
+        prior=prior,
+        admissible=admissible,
+        source=source,
+        weighed=weighed,
+        step=step,
     )
 
 
@@ -198,12 +230,5 @@ def _parameters(cls: type[Any]) -> Mapping[str, Parameter]:
     for entry in fields(cls):
         for note in getattr(hints[entry.name], "__metadata__", ()):
             if isinstance(note, Described):
-                parameters[entry.name] = Parameter(
-                    role=note.role,
-                    unit=note.unit,
-                    prior=note.prior,
-                    admissible=note.admissible,
-                    source=note.source,
-                    null=cast("float", entry.default),
-                )
+                parameters[entry.name] = Parameter(**vars(note), null=cast("float", entry.default))
     return parameters

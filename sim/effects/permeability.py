@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -23,11 +23,14 @@ class Permeability(PressureEffect):
         permeability: κ, face velocity per pressure difference.
     """
 
+    effect_class: ClassVar[str] = "dynamic-pressure"
     permeability: Annotated[
         Value,
         strength(
             unit="m/(s Pa)",
             prior=(0.0, 0.02),
+            weighed=(1e-3, 5e-2),
+            step=0.005,
             admissible=NOT_NEGATIVE,
             source="ISO 9237 at 100 Pa: 10–100 mm/s for dense weaves, 500–2,000 mm/s for open "
             "knits, divided by 100 Pa",

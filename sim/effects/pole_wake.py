@@ -38,6 +38,8 @@ class PoleWake(FlowEffect):
         strength(
             unit="1",
             prior=(0.3, 1.5),
+            weighed=(0.2, 1.5),
+            step=0.4,
             admissible=(0.0, 2.0),
             source="1 by theory; the constants scatter by 20 % between wakes, slanted poles more",
         ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -22,6 +22,8 @@ class Porosity(PressureEffect):
         open_share: φ, the open share of the area.
     """
 
+    unweighed: ClassVar[str] = "it does what an air-density below the base model's does"
+    effect_class: ClassVar[str] = "dynamic-pressure"
     open_share: Annotated[
         Value,
         strength(

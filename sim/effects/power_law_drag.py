@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -24,11 +24,14 @@ class PowerLawDrag(PressureEffect):
         speed: U₀ at which the force is the base model's.
     """
 
+    effect_class: ClassVar[str] = "dynamic-pressure"
     exponent: Annotated[
         Value,
         strength(
             unit="1",
             prior=(-0.3, 0.5),
+            weighed=(-0.5, 0.8),
+            step=0.2,
             admissible=(-2.0, 1.9),
             source="−dln C_D/dln Re: 0 for sharp-edged plates above Re 1000, to 0.5 for screens "
             "and threads at "

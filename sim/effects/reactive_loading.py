@@ -30,6 +30,7 @@ waves (decision 052).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -38,8 +39,9 @@ from sim.cloth.cloth_ends import Ends
 from sim.cloth.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.cloth.state import State
 from sim.cloth.system import System
-from sim.effects.added_mass import AddedMass, MassPerArea
+from sim.effects.added_mass import AddedMass, mass_per_area
 from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +52,8 @@ class ReactiveLoading(ForceEffect):
         mass: m_a, per area of cloth.
     """
 
-    mass: MassPerArea = 0.0
+    effect_class: ClassVar[str] = "fluid-inertia"
+    mass: Annotated[Value, mass_per_area(step=0.03)] = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         system = replace(system, loads=(*system.loads, AddedMass(mass=self.mass)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -29,11 +29,14 @@ class RestCurvature(Effect):
         curvature: of the cylinder; positive where the cloth is hollow on the side of its normals.
     """
 
+    double: ClassVar[bool] = True
     curvature: Annotated[
         Value,
         strength(
             unit="1/m",
             prior=(-3.0, 3.0),
+            weighed=(-6.0, 6.0),
+            step=1.0,
             admissible=(-50.0, 50.0),
             source="cloth stored on rolls of 0.3 m radius or more; the curl of knitted edges is "
             "stronger, but narrow",

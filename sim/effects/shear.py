@@ -29,6 +29,8 @@ class Shear(FlowEffect):
         strength(
             unit="1",
             prior=(-0.1, 0.5),
+            weighed=(-0.3, 0.8),
+            step=0.15,
             admissible=(-2.0, 2.0),
             source="0.1 over water, 0.14 open land, 0.2 by IEC 61400-1, 0.3–0.4 in towns; stable "
             "nights more",

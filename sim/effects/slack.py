@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -16,6 +17,7 @@ from sim.cloth.system import Springs, System
 from sim.effects.cloth_geometry import norm
 from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.effects.weighing import Need
 
 # Shorter cords count as this long [m], so that the gradient at none is finite.
 _SHORTEST = 1e-6
@@ -32,11 +34,16 @@ class Slack(Effect):
         length: ℓ.
     """
 
+    needs: ClassVar[Mapping[Need, str]] = {
+        Need.FILMS: "attachments that are taken from where markers show them lie farther out by it"
+    }
     length: Annotated[
         Value,
         strength(
             unit="m",
             prior=(0.005, 0.1),
+            weighed=(0.01, 0.15),
+            step=0.02,
             admissible=NOT_NEGATIVE,
             source="snap hooks and rings of 10–50 mm, loosely tied cords to 0.1 m",
         ),

@@ -4,7 +4,7 @@ thickness)."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -23,11 +23,14 @@ class TangentialLinearDrag(ForceEffect):
         coefficient: c, both sides together.
     """
 
+    effect_class: ClassVar[str] = "tangential-drag"
     coefficient: Annotated[
         Value,
         strength(
             unit="kg/(m² s)",
             prior=(0.0, 0.05),
+            weighed=(0.03, 1.5),
+            step=0.05,
             admissible=NOT_NEGATIVE,
             source="Blasius plate, two sides: 1.328 ρ U / √(U L/ν) is 0.009 to 0.06 at 2–10 m/s "
             "and 0.1–1 m",

@@ -4,7 +4,7 @@ boundary layer)."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from torch import Tensor
 
@@ -26,11 +26,14 @@ class TangentialQuadraticDrag(ForceEffect):
         density: ρ of the air.
     """
 
+    effect_class: ClassVar[str] = "tangential-drag"
     coefficient: Annotated[
         Value,
         strength(
             unit="1",
             prior=(0.0, 0.05),
+            weighed=(0.006, 0.3),
+            step=0.02,
             admissible=NOT_NEGATIVE,
             source="flat plates at Reynolds 1e4–1e6: 0.003–0.013 smooth (Schlichting, "
             "Boundary-Layer Theory); "

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from torch import Tensor
@@ -15,6 +16,7 @@ from sim.cloth.system import InapplicableError, System
 from sim.effects.cloth_geometry import horizontal, left_of, norm
 from sim.effects.effect import Effect
 from sim.effects.parameter import Value, strength
+from sim.effects.weighing import Copied, Need
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,11 +30,19 @@ class TiltedPole(Effect):
         sway: top toward z × f, to the left of who looks along the flag.
     """
 
+    needs: ClassVar[Mapping[Need, str]] = {Need.STILL: "carried attachments go their own ways"}
+    copied: ClassVar[Copied | None] = Copied(
+        by="the directions of wind and gravity",
+        shown_by=Need.ANCHORS,
+        how="a plumb line beside the pole",
+    )
     lean: Annotated[
         Value,
         strength(
             unit="rad",
             prior=(-0.5, 0.9),
+            weighed=(-0.4, 0.6),
+            step=0.02,
             admissible=(-math.pi / 2, math.pi / 2),
             source="vertical poles within 2°; wall-mounted poles lean by 30–45°",
         ),
@@ -42,6 +52,8 @@ class TiltedPole(Effect):
         strength(
             unit="rad",
             prior=(-0.1, 0.1),
+            weighed=(-0.25, 0.25),
+            step=0.02,
             admissible=(-math.pi / 2, math.pi / 2),
             source="poles set by eye: within 2–5°; tall ones bend in the wind",
         ),

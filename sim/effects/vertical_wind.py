@@ -28,6 +28,8 @@ class VerticalWind(WindEffect):
         strength(
             unit="rad",
             prior=(-0.2, 0.2),
+            weighed=(-0.4, 0.4),
+            step=0.05,
             admissible=(-_QUARTER, _QUARTER),
             source="terrain slopes of up to 10°; IEC 61400-1 asks for 8° of mean flow inclination",
         ),

@@ -26,7 +26,7 @@ this start moves the cloth by 0.29 of what the effect does, and zᵢ = F by 1.1 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -54,6 +54,7 @@ class WagnerLag(Effect):
         share: s; 1 for Jones' fit to Wagner's function.
     """
 
+    unweighed: ClassVar[str] = "in forecasts of 0.1 s it moves cloth as an air-density does"
     share: Annotated[
         Value,
         strength(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError
-from measure.forecasting import Suspicion, all_strengths, names, on_markers
+from measure.forecasting import Suspicion, names, on_films, on_markers
 from measure.inference import Evidence, NullModel
 from measure.loop import judge
 from measure.loop.run import _suspected_effect  # pyright: ignore[reportPrivateUsage]
@@ -169,7 +169,7 @@ def test_p_near_the_level_is_undecided(
 
 
 def test_only_what_markers_weigh_can_be_suspected_of_them() -> None:
-    assert {one.name for one in all_strengths()} - {one.name for one in on_markers()} == {
+    assert {one.name for one in on_films()} - {one.name for one in on_markers()} == {
         "slack.length"
     }
     with pytest.raises(UnknownNameError):

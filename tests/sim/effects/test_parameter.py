@@ -7,7 +7,7 @@ import torch
 
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from sim.effects import EFFECTS, Porosity, Shear, apply
+from sim.effects import EFFECTS, Parameter, Porosity, Role, Shear, apply
 from tests.sim.conftest import PLAIN, make_system
 
 
@@ -17,6 +17,26 @@ def test_a_refused_value_is_reported_with_its_admissible_range_and_expected_valu
     assert caught.value.where == "Porosity.open_share"
     assert caught.value.what == "0.1 to 1.5 is not admissible"
     assert caught.value.fix == "give a value from 0 to 1; expected are 0 to 0.3"
+
+
+@pytest.mark.parametrize(
+    ("prior", "null", "weighed", "step"),
+    [
+        ((0.0, 0.5), 0.0, (0.025, 0.5), 0.05),
+        ((1.2, 3.0), 1.0, (0.2, 2.0), 0.2),
+        ((-0.4, 0.1), 0.0, (-0.4, 0.1), -0.04),
+        ((-2.0, 0.0), 0.0, (-2.0, -0.1), -0.2),
+    ],
+)
+def test_an_effect_that_states_no_strengths_is_weighed_by_those_of_its_prior(
+    prior: tuple[float, float], null: float, weighed: tuple[float, float], step: float
+) -> None:
+    """One sign: the least is a twentieth of the most. Steps are a tenth, toward the farther end."""
+    described = Parameter(
+        role=Role.STRENGTH, unit="1", prior=prior, admissible=(-9.0, 9.0), source="", null=null
+    )
+    assert described.weighed_range == pytest.approx(weighed)
+    assert described.small_step == pytest.approx(step)
 
 
 def test_a_mistyped_effect_is_answered_with_the_nearest() -> None:

@@ -1,20 +1,20 @@
-"""Classes of effects that confusions are forgiven within (`catalogs/effect-classes.toml`)."""
+"""Classes of effects that confusions are forgiven within, as the effects state them."""
 
 from __future__ import annotations
 
-import functools
-import tomllib
 from collections.abc import Mapping
-from importlib.resources import files
+
+from sim.effects import CLASSES, EFFECTS
 
 
-@functools.cache
 def classes() -> Mapping[str, tuple[str, ...]]:
     """Class → its effects."""
-    text = (files("catalogs") / "effect-classes.toml").read_text(encoding="utf-8")
-    return {name: tuple(entry["effects"]) for name, entry in tomllib.loads(text).items()}
+    return {
+        name: tuple(effect for effect, kind in EFFECTS.usable() if kind.effect_class == name)
+        for name in CLASSES
+    }
 
 
 def class_of(effect: str) -> str:
     """The class of an effect: its own name where it shares one with no other."""
-    return next((name for name, effects in classes().items() if effect in effects), effect)
+    return (EFFECTS[effect].effect_class if effect in EFFECTS else "") or effect
