@@ -12,10 +12,11 @@ from flagdata.errors import RefusedError
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Calibrated(Answer):
-    """The cloth of a flag.
+    """The cloth of a flag or of drapes, or the flag as an anemometer.
 
     Attributes:
-        quantities: "area_weight", "bending", "damping" as far as they are known.
+        quantities: "area_weight", "bending", "damping" as far as they are known; none of a reading
+            model alone.
         level: of the intervals.
         draws: name → (n,) draws of their joint posterior.
         withheld: why no weight is given, where no simulated flag looks like a recording; None where
@@ -34,9 +35,12 @@ class Calibrated(Answer):
         """The posterior's median [kg/m²].
 
         Raises:
-            RefusedError: it is withheld, not determined, or only bounded.
+            RefusedError: it is withheld, not determined, or only bounded; or no flag was weighed.
         """
-        median = next(iter(self.quantities.values())).value
+        quantity = self.quantities.get("area_weight")
+        if quantity is None:
+            raise RefusedError(self.sentence, where="area weight", fix="calibrate a flag's weight")
+        median = quantity.value
         if median is None:
             fix = "look at `findings`; add recordings in other winds"
             raise RefusedError(self.sentence, where="area weight", fix=fix)

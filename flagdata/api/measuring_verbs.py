@@ -27,6 +27,7 @@ from flagdata.verbs.shared_options import (
     ByNulls,
     Drawn,
     FlagAndCamera,
+    Keeping,
     NamedLake,
     OfCloth,
     OfFilm,
@@ -224,8 +225,8 @@ class OfFlag(OfCloth, FlagAndCamera):
 
 
 @options
-class Calibrating(OfFlag, Drawn, BesideLake):
-    """How the cloth of a flag is weighed."""
+class Calibrating(OfFlag, Drawn, Keeping):
+    """How the cloth of a flag is weighed, and the flag made an anemometer."""
 
     recordings: (
         Mapping[str, ArrayLike] | Path | str | Sequence[Mapping[str, ArrayLike] | Path | str]
@@ -248,6 +249,28 @@ class Calibrating(OfFlag, Drawn, BesideLake):
         type=STATED,
         metavar="VALUE",
     )
+    only: str | None = option(
+        "Do only one: weigh the cloth, in minutes of simulation, or calibrate the flag as an "
+        "anemometer, as fast as "
+        "its film is read.",
+        default=None,
+        section=HOW,
+        type=click.Choice(["weight", "anemometer"]),
+    )
+    name: str | None = option(
+        "Of the reading model, by which flagdata measure --model finds it; by default the first "
+        "recording's with "
+        "-anemometer.",
+        default=None,
+        section=HOW,
+        metavar="NAME",
+    )
+    model: str | None = option(
+        "Network whose summary the reading model uses; by default flow-outdoor.",
+        default=None,
+        section=HOW,
+        metavar="NAME|FOLDER|ID",
+    )
     simulations: int = option(
         "Simulated flags for each recording.", default=128, section=HOW, type=click.IntRange(min=64)
     )
@@ -258,8 +281,8 @@ class Calibrating(OfFlag, Drawn, BesideLake):
 
 @make_call(Calibrating)
 def calibrate(chosen: Calibrating) -> Calibrated:
-    """The cloth of a flag from its motion and the wind beside it, as `flagdata calibrate` weighs
-    it.
+    """The cloth of a flag from its motion and the wind beside it, and the flag as an anemometer, as
+    `flagdata calibrate` makes both.
 
     ```python
     table = {"time": time, "wind": wind, "droop": droop, "extension": extension}
@@ -268,8 +291,10 @@ def calibrate(chosen: Calibrating) -> Calibrated:
     found.quantities["area_weight"].interval  # kg/m²
     ```
 
-    It simulates flags for each recording, which takes minutes; they are kept for the next call. Of
-    folders of drapes, with `area_weight=`, it finds the bending (see `docs/cases/drapes.md`).
+    It simulates flags for each recording, which takes minutes; they are kept for the next call.
+    Films of a lake make a reading model, too, or with `only="anemometer"` alone: its name is what
+    `flagdata.measure(model=…)` takes. Both are committed, unless `read_only=True`. Of folders of
+    drapes, with `area_weight=`, it finds the bending (see `docs/cases/drapes.md`).
 
     Raises:
         MissingExtraError: torch is not installed.
@@ -280,9 +305,7 @@ def calibrate(chosen: Calibrating) -> Calibrated:
         UnknownNameError: a material like which no cloth was measured.
         UsageError: options that do not fit.
     """
-    if chosen.area_weight is not None:
-        return call("measure.drape.drape_answer:calibrate_drapes", chosen)
-    return call("measure.cloth.calibrate_call:calibrate_arrays", chosen)
+    return call("measure.commands.calibrate_recordings:calibrate_recordings", chosen)
 
 
 @options

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from flagdata.answer import Answer, Array, Figure, Head, Section, Table
+from flagdata.answer import Array, Figure, Head, Section, Table
+from flagdata.answer.calibrated import Calibrated
 from flagdata.answer.charts import Axis, Band, Chart, Colour, Dots, Line, Panel
 from flagdata.core.findings import Severity
 from flagdata.core.shell import command_line
@@ -21,7 +22,7 @@ _WIDTH = 560
 """Of the chart beside it [px]."""
 
 
-def answer_of_reading(made: Made) -> Answer:
+def answer_of_reading(made: Made) -> Calibrated:
     """Returns the answer."""
     result = made.result
     model = result.model
@@ -30,7 +31,7 @@ def answer_of_reading(made: Made) -> Answer:
     if made.artifact is not None:
         provenance["artifact"] = made.artifact
     option = command_line("--model", made.name)
-    return Answer(
+    return Calibrated(
         question="calibrate",
         subject=made.name,
         sentence=_sentence(result),
@@ -52,6 +53,7 @@ def answer_of_reading(made: Made) -> Answer:
         ),
         make_sections=lambda: [reading_section(result)],
         provenance=provenance,
+        level=result.level,
     )
 
 

@@ -1,4 +1,4 @@
-"""Calibration from Python: `flagdata.calibrate`, with recordings as arrays, tables or names."""
+"""Recordings and options of a calibration as they are given: arrays, tables or names."""
 
 from __future__ import annotations
 
@@ -8,17 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flagdata.answer.calibrated import Calibrated
-from flagdata.api.measuring_verbs import Calibrating, OfFlag
+from flagdata.api.measuring_verbs import OfFlag
 from flagdata.core.files.caches import user_cache
 from flagdata.core.provenance import array_hash
 from flagdata.core.stated import Stated
-from flagdata.dataset.lake_source import lake_of
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError
 from flagdata.lake import Lake
 from flagdata.verbs.shared_options import ATTACHMENTS
-from measure.cloth.calibration_answer import answer_of_calibration
-from measure.cloth.cloth_calibration import calibrate
 from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.flag_prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
 from measure.cloth.flag_recordings import Opened, Sources, open_recording
@@ -99,38 +95,6 @@ def sources_of(
         return open_recording(str(source), size, reading, lake=lake, at=at, **part)
 
     return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
-
-
-def calibrate_arrays(chosen: Calibrating) -> Calibrated:
-    """Calibrates a flag from Python; see `flagdata.calibrate`.
-
-    Raises:
-        FlagdataError: see `flagdata.calibrate`.
-    """
-    several = chosen.recordings
-    several = [several] if isinstance(several, Mapping | Path | str) else list(several)
-    if not several:
-        raise InputError("no recordings are given", where="recordings", fix="give at least one")
-    if chosen.flag_size is None:
-        raise UsageError(
-            "the flag's size is missing",
-            where="flag_size",
-            fix="give length and height in metres, as in (1.5, 1.0)",
-        )
-    size = FlagSize.of(chosen.flag_size)
-    drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
-    options = options_of(chosen, size, **drawn)
-    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(
-        size
-    )
-    calibration = calibrate(
-        gathered.recordings,
-        options,
-        folder=folder_of(chosen),
-        workers=chosen.workers,
-        left_out=gathered.left_out,
-    )
-    return answer_of_calibration(calibration)
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:

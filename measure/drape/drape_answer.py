@@ -195,15 +195,6 @@ def read_drapes(
     return answer_of(Surface.fit(*found), faces, weight, level=chosen.level, seed=chosen.seed)
 
 
-def calibrate_drapes(chosen: Calibrating) -> Calibrated:
-    """Finds the cloth of drapes from Python; see `flagdata.calibrate`.
-
-    Raises:
-        FlagdataError: see `read_drapes`.
-    """
-    return answer_of_drapes(read_drapes(chosen, workers=chosen.workers))
-
-
 def answer_of_drapes(found: Draped) -> Calibrated:
     """Returns what drapes answer, as all renderers take it."""
     return Calibrated(
@@ -213,7 +204,7 @@ def answer_of_drapes(found: Draped) -> Calibrated:
         tone=Tone.OPEN if found.bending.value is None else Tone.SETTLED,
         quantities=found.cloth,
         findings=found.findings,
-        document=json_values(found),
+        document={**json_values(found), "artifact": None, "anemometer": None},
         arrays=arrays_of_draws(found.cloth, found.draws),
         head=Head(
             figures=[

@@ -53,7 +53,7 @@ from scipy.special import bdtrc, ndtr, ndtri
 from flagdata.core.arrays import BoolArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError
-from measure.gate.reasons import REASONS
+from measure.gate.reasons import REASONS, UNCALIBRATED
 
 SHARE = 0.25
 """Share of strange windows above which a recording is refused, fixed on 2026-11-27 by the text
@@ -138,7 +138,8 @@ class Verdict:
         p: of the window that decides there, the `refusing`-th strangest.
         window_p: (k,) of each window there.
         blank: (k,) whether there is nothing to measure in it, at any size.
-        faults: of the film, that were counted, of kinds of `REASONS`; any of them refuses it.
+        faults: of the film, that were counted, of kinds of `REASONS` or
+            `UNCALIBRATED`; any of them refuses it.
         window_reasons: of a usual window, among the strange ones where these refuse the recording;
             the strongest first.
     """
@@ -223,7 +224,8 @@ class Verdict:
         if not self.measurable:
             return "there is nothing to measure in it"
         if self.faults:
-            return REASONS[self.faults[0].kind].brief
+            kind = self.faults[0].kind
+            return UNCALIBRATED[kind] if kind in UNCALIBRATED else REASONS[kind].brief
         if self.unlike:
             return "it is not like the films that the network was trained on"
         return "it depends on the size of the flag, which was not given"

@@ -144,3 +144,14 @@ REASONS: dict[str, Fault] = {
 }
 """By kind, in the order in which they are stated: what is wrong with the recording before what
 follows from it."""
+
+UNCALIBRATED = {
+    "another-picture": "the picture is of another shape than that of the calibration",
+    "another-place": "the film may be from another place than the calibration",
+    "another-framing": "the flag's hoist is not where it was in the picture",
+    "another-size": "the flag is of another size than that of the calibration",
+    "another-wind": "hardly any window reads a wind in which the flag was calibrated",
+    "another-flag": "it may be another flag than that of the calibration",
+}
+"""Kind → why a reading model refuses a film that is not like those of its calibration, in a few
+words."""

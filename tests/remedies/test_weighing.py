@@ -124,7 +124,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "commands/calibrate.py",
+        "commands/calibrate_recordings.py",
         "or give --only weight",
         f"calibrate t.csv {SIZED} --name x",
         (f"calibrate t.csv {SIZED} --only weight",),

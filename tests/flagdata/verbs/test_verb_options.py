@@ -163,7 +163,7 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(
     )
     of_films = typed_words("close-loop", CloseLoopCommand, *words.split(), "--attachment", "hoist")
     of_call = called_with(
-        "measure.cloth.calibrate_call.calibrate_arrays",
+        "measure.commands.calibrate_recordings.calibrate_recordings",
         lambda: flagdata.calibrate(
             "t.csv",
             flag_size=(1.5, 1.0),

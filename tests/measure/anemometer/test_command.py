@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+import flagdata
 from flagdata.core.schema import Kind
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
@@ -119,6 +120,39 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     newest = network("garden", lake=Lake.open(lake), at=None).artifact
     assert newest is not None
     assert newest.code_version == "0.1.0+mended"
+
+
+def test_the_call_makes_the_reading_model_of_the_command_with_its_answer(
+    lake: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options: dict[str, Any] = {"lake": lake, "flag_size": (1.5, 1.0), "only": "anemometer"}
+    looked_at = flagdata.calibrate("monday", name="garden", read_only=True, **options)
+    assert looked_at.document["anemometer"]["artifact"] is None
+    found = flagdata.calibrate("monday", name="garden", **options)
+    given = ("--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer", "--name", "garden")
+    printed = json.loads(_run(calibrate, "monday", *given, "--json").stdout)
+    assert found.document == {"anemometer": printed["anemometer"]}
+    assert found.sentence.startswith("This flag reads winds of ")
+    windows = found.to_xarray()
+    error = windows["wind_speed"] - windows["wind_logged"]
+    rmse = found.document["anemometer"]["rmse"]
+    assert float((error**2).mean()) ** 0.5 == pytest.approx(rmse, rel=1e-6)
+    with pytest.raises(RefusedError, match="reads winds"):
+        _ = found.area_weight
+
+    _shown(monkeypatch, seed=2)
+    measured = flagdata.measure("monday", lake=lake, model="garden", flag_size=(1.5, 1.0))
+    mean = gusts(float(_SECONDS), seed=2)[1][300:1500].mean()
+    low, high = measured.wind.interval
+    assert low - 0.1 < mean < high + 0.1
+
+
+def test_the_call_refuses_what_the_command_refuses(lake: Path) -> None:
+    with pytest.raises(UsageError, match="--name cannot be combined") as refused:
+        flagdata.calibrate("monday", lake=lake, flag_size=(1.5, 1.0), only="weight", name="garden")
+    assert refused.value.where == "name"
+    with pytest.raises(UsageError, match="no pictures"):
+        flagdata.calibrate({"time": [0.0]}, flag_size=(1.5, 1.0), only="anemometer")
 
 
 def test_a_model_whose_network_has_changed_is_refused(
