@@ -102,10 +102,7 @@ def compare_winds(
     """
     if is_bound:
         return WindComparison(stated=stated, difference=None, level=level)
-    generator = stream(seed, "wind-elsewhere")
-    elsewhere = generator.uniform(
-        stated.low, stated.high, len(wind)
-    ) + stated.sigma * generator.standard_normal(len(wind))
+    elsewhere = stated.draw(stream(seed, "wind-elsewhere"), len(wind))
     low, high = np.quantile(wind - elsewhere, [(1 - level) / 2, (1 + level) / 2]).tolist()
     return WindComparison(stated=stated, difference=(low, high), level=level)
 

@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flagdata.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from flagdata.core.arrays import FloatArray
 
 _NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 _ALONE = re.compile(_NUMBER)
@@ -58,6 +63,16 @@ class Stated:
         return cls(low=float(low), high=float(high))
 
     @property
+    def middle(self) -> float:
+        """The value, or the middle of the range."""
+        return (self.low + self.high) / 2
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation; of a range that of a uniform distribution over it."""
+        return self.sigma or (self.high - self.low) / math.sqrt(12)
+
+    @property
     def exact(self) -> bool:
         """Whether one value is stated, without an uncertainty."""
         return self.low == self.high and not self.sigma
@@ -72,6 +87,13 @@ class Stated:
     def within(self, deviations: float) -> tuple[float, float]:
         """Returns the range, or the value less and plus so many standard deviations."""
         return self.low - deviations * self.sigma, self.high + deviations * self.sigma
+
+    def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draws (count,) values that it allows: from a normal distribution, uniform over a
+        range."""
+        if self.low < self.high:
+            return rng.uniform(self.low, self.high, count)
+        return self.low + self.sigma * rng.standard_normal(count)
 
     def recipe(self) -> Any:
         """Returns the JSON value: a number, a list of two of a range, or value and sigma."""

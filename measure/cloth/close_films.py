@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 from flagdata.core.console import progress, say
-from flagdata.core.stated import Stated
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from measure.closing.model_recipes import NamedModel, acting, acting_effects, fitted_parameters
@@ -136,8 +135,6 @@ LEVEL = 0.9
 _FEW, _MANY = 64, 128
 """Simulations of the base model for each recording, of one or two and of more."""
 _TWO = 2
-_RELATIVE = 0.01
-"""Standard uncertainty of a weight that is stated without one, as a share."""
 
 
 def close_films(
@@ -175,7 +172,7 @@ def close_films(
     )
     options = FilmLoopOptions(
         calibration=calibration,
-        area_weight=None if chosen.area_weight is None else weight(chosen.area_weight),
+        area_weight=chosen.area_weight,
         level=CRITERIA.level if level is None else level,
         kinds=CRITERIA.film_kinds if chosen.nulls is None else chosen.nulls,
         suspected=None
@@ -233,22 +230,3 @@ def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
     paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
     finer = sum(effort(duration) for duration in durations)
     return flags * sum(durations) + finer + paired * lasting(len(durations))
-
-
-def weight(area_weight: Stated) -> tuple[float, float]:
-    """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a
-    uniform distribution.
-
-    Raises:
-        UsageError: a weight that no cloth has.
-    """
-    middle = (area_weight.low + area_weight.high) / 2
-    if not middle > 0:
-        raise UsageError(
-            f"the area weight is {area_weight.text} kg/m²",
-            where="--area-weight",
-            fix="give one above 0, as in 0.155±0.005",
-        )
-    return middle, max(
-        area_weight.sigma, (area_weight.high - area_weight.low) / 12**0.5, _RELATIVE * middle
-    )

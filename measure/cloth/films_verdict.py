@@ -89,7 +89,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         outcome.sights,
         effect=None if acting is None else acting[0],
         control=effects[rest[0]] if rest and acting is not None else None,
-        scale_weight=options.area_weight,
+        area_weight=options.area_weight,
         seed=options.calibration.seed,
     )
     verdict = Verdict(

@@ -20,6 +20,7 @@ import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError, UsageError
 from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
@@ -39,6 +40,7 @@ from measure.cloth.observed_recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
 from measure.cloth.simulations import (
     Simulations,
+    deviation_of,
     of_base,
     of_nulls,
     of_recordings,
@@ -154,8 +156,7 @@ class FilmLoopOptions:
     Attributes:
         calibration: the flag, its view, the number of simulations and the seed, as for `flagdata
             calibrate`.
-        area_weight: mean and standard deviation of a cloth that was weighed [kg/m²]; None for the
-            prior of all cloths.
+        area_weight: of a cloth that was weighed [kg/m²]; None for the prior of all cloths.
         level: of the test.
         kinds: of numerics among null experiments.
         only: names of the effects that are weighed; empty for all.
@@ -168,7 +169,7 @@ class FilmLoopOptions:
     """
 
     calibration: CalibrationOptions
-    area_weight: tuple[float, float] | None = None
+    area_weight: Stated | None = None
     level: float = CRITERIA.level
     kinds: int = CRITERIA.film_kinds
     only: tuple[str, ...] = ()
@@ -185,12 +186,11 @@ class FilmLoopOptions:
         low, high = ends or (0.0, math.inf)
         if (
             self.area_weight is not None
-            and not low / _BEYOND < self.area_weight[0] < high * _BEYOND
+            and not low / _BEYOND < self.area_weight.middle < high * _BEYOND
         ):
             raise UsageError(
-                f"an area weight of {self.area_weight[0]:.3g} kg/m²; null experiments have flags "
-                f"of {low:g} "
-                f"to {high:g}",
+                f"an area weight of {self.area_weight.text} kg/m²; null experiments have flags of "
+                f"{low:g} to {high:g}",
                 where="--area-weight",
                 fix="give kg/m² (155 g/m² is 0.155)",
             )
@@ -214,7 +214,9 @@ class FilmLoopOptions:
         """Returns JSON values."""
         return {
             **self.calibration.recipe(),
-            "area_weight": None if self.area_weight is None else list(self.area_weight),
+            "area_weight": None
+            if self.area_weight is None
+            else [self.area_weight.middle, deviation_of(self.area_weight)],
             "test_level": self.level,
             "kinds": self.kinds,
             "only": list(self.only),

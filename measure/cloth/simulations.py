@@ -12,6 +12,7 @@ import numpy as np
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.findings import Finding
 from flagdata.core.rng import child_seed, stream
+from flagdata.core.stated import Stated
 from measure.cloth.design import (
     TOGETHER,
     CalibrationOptions,
@@ -31,6 +32,9 @@ from measure.cloth.numerics import Correction, Finer, with_errors
 from measure.cloth.observed_recording import Observed, Projection, check_in_all, shown, usable
 from measure.cloth.sight import first_of, response_of
 from measure.forecasting.setting import Stage
+
+_RELATIVE = 0.01
+"""Standard uncertainty of a weight that is stated without one, as a share."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -275,31 +279,39 @@ class _Part(Observed):
         return Projection(speed=self.speeds, changes=False)
 
 
+def deviation_of(area_weight: Stated) -> float:
+    """Returns the standard deviation of a stated area weight [kg/m²], `_RELATIVE` of it at
+    least."""
+    return max(area_weight.deviation, _RELATIVE * area_weight.middle)
+
+
 def of_recordings(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
-    scale_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
 ) -> Experiments:
     """Returns the recordings as the one experiment that they are.
 
     Args:
-        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
+        area_weight: of a cloth that was weighed [kg/m²].
     """
     summaries = tuple(
         recording.summary[None, sight.used]
         for sight, recording in zip(sights, recordings, strict=True)
     )
-    if scale_weight is None:
+    if area_weight is None:
         return Experiments(summaries=summaries)
-    mean, sigma = scale_weight
-    return Experiments(summaries=summaries, stated=np.array([mean]), sigma=sigma / mean)
+    mean = area_weight.middle
+    return Experiments(
+        summaries=summaries, stated=np.array([mean]), sigma=deviation_of(area_weight) / mean
+    )
 
 
 def of_nulls(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    scale_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     *,
     seed: int,
 ) -> tuple[Experiments, IntArray]:
@@ -321,7 +333,7 @@ def of_nulls(
     experiments = Experiments(summaries=tuple(rows[complete] for rows in columns))
     kinds = simulations.kinds[complete]
     return _as_weighed(
-        experiments, simulations.weights, complete, scale_weight, seed=seed, stream_name="scale"
+        experiments, simulations.weights, complete, area_weight, seed=seed, stream_name="scale"
     ), kinds
 
 
@@ -329,7 +341,7 @@ def of_base(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    scale_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     *,
     seed: int,
 ) -> Experiments:
@@ -353,7 +365,7 @@ def of_base(
         experiments,
         weights,
         complete,
-        scale_weight,
+        area_weight,
         seed=seed,
         stream_name="scale of the base model",
     )
@@ -363,7 +375,7 @@ def _as_weighed(
     experiments: Experiments,
     weights: FloatArray,
     which: BoolArray,
-    scale_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     *,
     seed: int,
     stream_name: str,
@@ -375,9 +387,9 @@ def _as_weighed(
         weights: (n,) of all that were simulated [kg/m²].
         which: (n,) of them the experiments are of.
     """
-    if scale_weight is None:
+    if area_weight is None:
         return experiments
-    share = scale_weight[1] / scale_weight[0]
+    share = deviation_of(area_weight) / area_weight.middle
     read = weights * np.exp(
         share * stream(seed, "films", stream_name).standard_normal(len(weights))
     )

@@ -18,6 +18,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
 from flagdata.core.rng import stream
+from flagdata.core.stated import Stated
 from flagdata.errors import RefusedError
 from measure.cloth.design import Weighable
 from measure.cloth.flag_simulation import OBSERVED
@@ -81,7 +82,7 @@ def compare_models(
     *,
     effect: Weighable | None,
     control: Weighable | None,
-    scale_weight: tuple[float, float] | None = None,
+    area_weight: Stated | None = None,
     seed: int,
 ) -> tuple[Comparison, ...]:
     """Comparisons for each observable: on other halves, and on recordings left out.
@@ -91,7 +92,7 @@ def compare_models(
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
-        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
+        area_weight: of a cloth that was weighed [kg/m²].
     """
     comparisons: list[Comparison] = []
     for words, tasks in (
@@ -102,7 +103,7 @@ def compare_models(
             predicted
             for task in tasks
             for predicted in _predict_windows(
-                task, effect=effect, control=control, scale_weight=scale_weight, seed=seed
+                task, effect=effect, control=control, area_weight=area_weight, seed=seed
             )
         ]
         for column, name in enumerate(OBSERVED):
@@ -181,11 +182,11 @@ def _predict_windows(
     *,
     effect: Weighable | None,
     control: Weighable | None,
-    scale_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     seed: int,
 ) -> list[Prediction]:
     sights = [sight for sight, _ in task.fitted]
-    experiment = of_recordings(sights, [recording for _, recording in task.fitted], scale_weight)
+    experiment = of_recordings(sights, [recording for _, recording in task.fitted], area_weight)
     rng = stream(seed, "films", "places")
 
     def means(which: Weighable | None) -> list[FloatArray]:

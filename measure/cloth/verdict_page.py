@@ -28,7 +28,7 @@ from measure.cloth.loop import SolvedLoop
 from measure.cloth.model_evidence import Fit, Sight, fit_model, hypothesis
 from measure.cloth.observables_chart import Predicted, chart_against_wind
 from measure.cloth.observed_recording import Observed
-from measure.cloth.simulations import of_recordings
+from measure.cloth.simulations import deviation_of, of_recordings
 from measure.observables import View
 from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
@@ -267,7 +267,7 @@ def _facts(outcome: SolvedLoop) -> dict[str, str]:
         "flag": f"{flag.length:g} m × {flag.height:g} m, {flag.attachment}",
         "area weight": "not weighed"
         if weight is None
-        else f"{weight[0]:.3g} ± {weight[1]:.1g} kg/m²",
+        else f"{weight.middle:.3g} ± {deviation_of(weight):.1g} kg/m²",
     }
 
 

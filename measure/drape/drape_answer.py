@@ -41,6 +41,8 @@ from sim.run.cusick_drape import DISC, PEDESTAL
 _LOST = 0.03
 """Share of the area from which on a scan that lacks it is reported."""
 
+_LIGHTEST = 1e-3
+"""Share of the stated weight below which no draw of it is: none is negative."""
 _FEWEST = 50
 """Independent draws below which an interval is reported with a warning."""
 
@@ -317,7 +319,8 @@ def answer_of(
             fix="look at the scans; cloth with a bending length below 10 mm is too limp for this "
             "model",
         )
-    weight = _drawn(area_weight, len(fit.predicted), seed=seed)
+    drawn = area_weight.draw(stream(seed, "drape", "weight"), len(fit.predicted))
+    weight = np.maximum(drawn, _LIGHTEST * area_weight.low)
     length = fit.cloth[BENDING_LENGTH.name]
     bending = length**3 * weight * -GRAVITY[2]
     low, high = BENDING_LENGTH.at(np.array([0.0, 1.0])) ** 3 * float(weight.mean()) * -GRAVITY[2]
@@ -339,15 +342,6 @@ def answer_of(
         draws={one.name: draws[one.name] for one in reported},
         level=level,
         findings=(*_lost(faces), *_few(fit), *_differ(surface, faces, seed=seed)),
-    )
-
-
-def _drawn(area_weight: Stated, count: int, *, seed: int) -> FloatArray:
-    rng = stream(seed, "drape", "weight")
-    if area_weight.low < area_weight.high:
-        return rng.uniform(area_weight.low, area_weight.high, count)
-    return np.maximum(
-        area_weight.low + area_weight.sigma * rng.standard_normal(count), 1e-3 * area_weight.low
     )
 
 

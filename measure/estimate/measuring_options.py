@@ -102,5 +102,5 @@ class Options:
                     + ("" if sizes.given else ", and --flag-size"),
                 )
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
-            constraints.append(Known.stated(name, stated_value, scale=scale**power))
+            constraints.append(Known(name=name, statement=stated_value, scale=scale**power))
         return tuple(constraints)

@@ -108,10 +108,8 @@ class Setting:
     @property
     def prior(self) -> FloatArray:
         """(theta,) standard deviations of the calibrated parameters."""
-        specimen = self.experiment.specimen
-        return (
-            prior(specimen.area_weight_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
-        )
+        uncertainty = self.experiment.specimen.area_weight_uncertainty
+        return PRIOR_WITHOUT_MASS if uncertainty is None else prior(uncertainty)
 
     @property
     def recording(self) -> IntArray:

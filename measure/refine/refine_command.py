@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.console import progress
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError
 from flagdata.lake import Artifact
 from flagdata.recipes.typed_tables import Range
@@ -129,7 +130,7 @@ def run(
     level: float,
     cache: Path | None = None,
     view: View | None = None,
-    area_weight: tuple[float, float] | None = None,
+    area_weight: Stated | None = None,
     aspect: float | None = None,
 ) -> Refinement:
     """Refines clips of one flag, with a progress bar.
@@ -148,7 +149,7 @@ def run(
     """
     recipes, space = scenes_of(estimator, aspect=aspect), space_of(estimator)
     if area_weight is not None:
-        stated_range = Range(low=area_weight[0], high=area_weight[1])
+        stated_range = Range(low=area_weight.low, high=area_weight.high)
         recipes = tuple(
             replace(recipe, material=replace(recipe.material, area_weight=stated_range))
             for recipe in recipes

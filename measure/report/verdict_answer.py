@@ -211,10 +211,9 @@ def _facts_of(experiment: Experiment) -> dict[str, str]:
     specimen = experiment.specimen
     weight = number(specimen.material.area_weight)
     cloth = f"{specimen.material.name}, nominally {weight} kg/m²"
+    uncertainty = specimen.area_weight_uncertainty
     known = (
-        f", known to {100 * specimen.area_weight_uncertainty:.2g} %"
-        if specimen.mass_known
-        else ", its mass not known"
+        ", its mass not known" if uncertainty is None else f", known to {100 * uncertainty:.2g} %"
     )
     gains, directions, clocks = zip(
         *(recording.wind.uncertainty for recording in experiment.recordings), strict=True

@@ -116,7 +116,7 @@ def bounds(ended: Sequence[str]) -> tuple[str, ...]:
 def ratios(experiment: Experiment) -> tuple[str, ...]:
     """Says what the numbers are of where the mass of the cloth is not known; nothing where it
     is."""
-    if experiment.specimen.mass_known:
+    if experiment.specimen.area_weight_uncertainty is not None:
         return ()
     sentence = (
         "The mass of the cloth is not known: motion shows forces per mass alone, so that area "
@@ -217,7 +217,7 @@ def _how_well_weighed(specimen: Specimen) -> tuple[str, ...]:
     """Says how well the cloth's mass is known, and what that leaves open; nothing where it is not
     known."""
     uncertainty, weight = specimen.area_weight_uncertainty, specimen.material.area_weight
-    if not specimen.mass_known:
+    if uncertainty is None:
         return ()
     known_to = f"its area weight is known to {100 * uncertainty:.2g} % (one standard deviation)"
     weighing = (

@@ -255,8 +255,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     specimen = Specimen(
         mesh=mesh,
         material=_material(descriptions, setup),
-        mass_known=setup.mass_known,
-        area_weight_uncertainty=setup.area_weight_uncertainty,
+        area_weight_uncertainty=setup.relative,
         held=vertices,
         anchors=anchors_of(recordings, seats),
         anchors_given=False,
@@ -379,7 +378,7 @@ def _check_experiment(experiment: Experiment) -> tuple[Finding, ...]:
         findings += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         findings += surroundings.check_strength(recording, specimen)
-        if specimen.mass_known and not experiment.carried:
+        if specimen.area_weight_uncertainty is not None and not experiment.carried:
             findings += inertia_check.check_inertia(recording, specimen)
     if not experiment.carried:
         attachment.check_places(experiment.recordings, specimen)
@@ -459,9 +458,8 @@ def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
 
 def _material(descriptions: Sequence[Known], setup: Setup) -> Material:
     material = _nominal(descriptions, setup)
-    return (
-        material if setup.area_weight is None else replace(material, area_weight=setup.area_weight)
-    )
+    stated = setup.area_weight
+    return material if stated is None else replace(material, area_weight=stated.middle)
 
 
 def _nominal(descriptions: Sequence[Known], setup: Setup) -> Material:

@@ -299,11 +299,11 @@ def _setup(form: _ExperimentTables, folder: Path, *, where: str) -> Setup:
     air = typed_tables.entries(_AIR, form.air, where=f"{where} [air]")
     gravity = air.pop("gravity", None)
     weight = _weight(material, where=inside)
+    relative = material.get(_UNCERTAINTY, AREA_WEIGHT_UNCERTAINTY)
     setup = Setup(
         material=_material(material, folder, where=inside),
-        mass_known=not material.get("mass-unknown", False),
-        area_weight=weight.low if weight is not None and weight.exact else None,
-        area_weight_uncertainty=material.get(_UNCERTAINTY, AREA_WEIGHT_UNCERTAINTY),
+        area_weight=weight if weight is not None and weight.exact else None,
+        area_weight_uncertainty=None if material.get("mass-unknown") else relative,
         outline=_outline(cloth, folder, where=f"{where} [cloth]"),
         pins=pins.at or pins.points or None,
         carried=pins.carried,

@@ -39,11 +39,10 @@ class Setup:
 
     Attributes:
         material: nominal.
-        mass_known: whether the cloth was weighed, or its material is known; else its area weight is
-            a guess, and all that is found is a ratio to it.
-        area_weight: in place of the material's [kg/m²]; None for that.
-        area_weight_uncertainty: relative standard uncertainty of the cloth's area weight where the
-            mass is known.
+        area_weight: of the cloth, in place of the material's [kg/m²]; None for that.
+        area_weight_uncertainty: relative standard uncertainty of an area weight that is stated
+            without one, as the material's is; None of a cloth that was not weighed and whose
+            material is a guess: all that is found is then a ratio to it.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
         carried: whether the attachments move: the cloth is held by hands or by a robot. They then
@@ -59,9 +58,8 @@ class Setup:
     """
 
     material: Material | None = None
-    mass_known: bool = True
-    area_weight: float | None = None
-    area_weight_uncertainty: float = AREA_WEIGHT_UNCERTAINTY
+    area_weight: Stated | None = None
+    area_weight_uncertainty: float | None = AREA_WEIGHT_UNCERTAINTY
     outline: FloatArray | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
     carried: bool = False
@@ -95,15 +93,26 @@ class Setup:
             raise self._wrong(
                 "a stiffness of pins that are carried", "leave it out: they hold rigidly"
             )
-        if not 0 < self.area_weight_uncertainty <= 1:
+        if self.area_weight is not None and not self.area_weight.middle > 0:
             raise self._wrong(
-                f"the relative uncertainty of the area weight is {self.area_weight_uncertainty!r}",
+                f"the area weight is {self.area_weight.text} kg/m²", "give kg/m² above 0"
+            )
+        if self.relative is not None and not 0 < self.relative <= 1:
+            raise self._wrong(
+                f"the relative uncertainty of the area weight is {self.relative!r}",
                 "give the relative standard uncertainty, such as 0.02 for 2 %",
             )
         if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
             raise self._wrong(f"the gravity is {self.gravity!r}", "give m/s², downward")
         if self.vertices < 16:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
+
+    @property
+    def relative(self) -> float | None:
+        """The relative standard uncertainty of the cloth's area weight; None of a guess."""
+        if self.area_weight is None or self.area_weight.exact:
+            return self.area_weight_uncertainty
+        return self.area_weight.deviation / self.area_weight.middle
 
     def state_weight(self, area_weight: Stated | None, relative: float | None = None) -> Setup:
         """Puts what the user states of the cloth's weight in place of the material's; with neither,
@@ -119,24 +128,21 @@ class Setup:
         if area_weight is None:
             if relative is None:
                 return self
-            return replace(self, mass_known=True, area_weight_uncertainty=relative)
+            value = None if self.area_weight is None else Stated.of(self.area_weight.middle)
+            return replace(self, area_weight=value, area_weight_uncertainty=relative)
         if relative is not None:
             raise UsageError(
                 "the uncertainty of the weight is given twice",
                 where="--density-uncertainty",
                 fix="leave it out: --area-weight states both",
             )
-        value = (area_weight.low + area_weight.high) / 2
-        sigma = area_weight.sigma or (area_weight.high - area_weight.low) / math.sqrt(12)
-        if not 0 < sigma <= value:
+        if not 0 < area_weight.deviation <= area_weight.middle:
             raise UsageError(
                 f"an area weight of {area_weight.text} kg/m² has no usable uncertainty",
                 where="--area-weight",
                 fix="give that of the weighing, as in 0.155±0.003",
             )
-        return replace(
-            self, area_weight=value, mass_known=True, area_weight_uncertainty=sigma / value
-        )
+        return replace(self, area_weight=area_weight)
 
     def _wrong(self, message: str, fix: str) -> InputError:
         return InputError(message, where="setup", fix=fix)

@@ -268,8 +268,8 @@ class Specimen:
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
-        mass_known: whether its area weight is known at least as well as from a material's name.
-        area_weight_uncertainty: relative standard uncertainty of its area weight, where that is so.
+        area_weight_uncertainty: relative standard uncertainty of its area weight; None where that
+            is a guess, not known as well as from a material's name.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
@@ -288,8 +288,7 @@ class Specimen:
     anchors: FloatArray
     stiffness: float = ARCSIM_STIFFNESS
     anchors_given: bool = True
-    mass_known: bool = True
-    area_weight_uncertainty: float = AREA_WEIGHT_UNCERTAINTY
+    area_weight_uncertainty: float | None = AREA_WEIGHT_UNCERTAINTY
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 
@@ -381,7 +380,7 @@ def describe_cloth(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
         "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
         "material": [material.area_weight, material.damping],
-        "density-uncertainty": specimen.area_weight_uncertainty if specimen.mass_known else None,
+        "density-uncertainty": specimen.area_weight_uncertainty,
     }
     return content, [
         specimen.mesh.rest,

@@ -53,69 +53,49 @@ class Known:
 
     Attributes:
         name: of the quantity, as "area_weight".
-        low, high: (n, m) ends of its range in the quantity's unit, equal where a value is stated; m
-            is 1, or the number of draws that are asked for, each of which then has its own.
-        sigma: (n, m) standard deviations of values; 0 of exact ones and of ranges.
+        statement: about it, in its unit.
+        scale: (n, m) by which it is larger than the one of the network; m is 1, or the number of
+            draws that are asked for, each of which then has its own.
 
     Raises:
-        InputError: shapes that differ, ends that are not in order, or several kinds of statement.
+        InputError: a scale of another shape, or not above 0.
     """
 
     name: str
-    low: FloatArray
-    high: FloatArray
-    sigma: FloatArray
-
-    @classmethod
-    def stated(cls, name: str, statement: Stated, *, scale: FloatArray) -> Known:
-        """States a quantity that is `scale` (n, m) times the one of the network."""
-        low, high, sigma = (
-            np.asarray(end / scale) for end in (statement.low, statement.high, statement.sigma)
-        )
-        return cls(name=name, low=low, high=high, sigma=sigma)
+    statement: Stated
+    scale: FloatArray
 
     @classmethod
     def everywhere(cls, name: str, statement: Stated, *, count: int) -> Known:
         """Repeats a statement for all of `count` clips."""
-        return cls.stated(name, statement, scale=np.ones((count, 1)))
-
-    @classmethod
-    def of_aspect(cls, length: float, height: float, *, count: int) -> Known:
-        """States the ratio of a flag's length to its height, of a model that estimates it, the same
-        for all of `count` clips.
-
-        Args:
-            length, height: of the flag, in one unit.
-        """
-        return cls.everywhere(ASPECT, stated_aspect(length, height), count=count)
+        return cls(name=name, statement=statement, scale=np.ones((count, 1)))
 
     def __post_init__(self) -> None:
-        shape = self.low.shape
-        if self.low.ndim != 2 or self.high.shape != shape or self.sigma.shape != shape:
+        if self.scale.ndim != 2 or not (self.scale > 0).all():
             raise InputError(
-                f"the ends of the {self.name} have the shapes {shape}, {self.high.shape}, "
-                f"{self.sigma.shape}",
-                fix="give (n, m)",
-            )
-        if (self.low > self.high).any() or (self.sigma < 0).any():
-            raise InputError(
-                f"the ends of the {self.name} are not in order", fix="give the lower end first"
-            )
-        wide, blurred = self.high > self.low, self.sigma > 0
-        if wide.any() != wide.all() or blurred.any() != blurred.all() or (wide & blurred).any():
-            raise InputError(
-                f"the {self.name} is stated in several ways",
-                fix="give values, values with deviations, or ranges",
+                f"the scale of the {self.name} has the shape {self.scale.shape}, or is not above 0",
+                fix="give (n, m) above 0",
             )
 
     @property
     def exact(self) -> bool:
-        """Whether values are stated, without uncertainty."""
-        return bool((self.low == self.high).all() and not self.sigma.any())
+        """Whether a value is stated, without uncertainty."""
+        return self.statement.exact
+
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(n, m) ends of its range in the network's terms, equal where a value is stated."""
+        return self.statement.low / self.scale, self.statement.high / self.scale
+
+    @property
+    def sigma(self) -> FloatArray:
+        """(n, m) standard deviations of values likewise; 0 of exact ones and of ranges."""
+        return self.statement.sigma / self.scale
 
     def reach(self) -> tuple[FloatArray, FloatArray]:
         """Returns (n, m) ends of where the quantity can lie."""
-        return self.low - REACH * self.sigma, self.high + REACH * self.sigma
+        low, high = self.ends
+        return low - REACH * self.sigma, high + REACH * self.sigma
 
 
 def stated_aspect(length: float, height: float) -> Stated:
@@ -185,7 +165,7 @@ def restrict_mixtures(
         _check(statement, scaling, column)
     ends = _Ends.of(scaling, columns, like=mixture.location)
     marginal = mixture.marginal(columns)
-    exact = [ends.tensor(statement.low) for statement in order[soft:]]
+    exact = [ends.tensor(statement.ends[0]) for statement in order[soft:]]
     if soft:
         values, log_mass = _drawn(
             marginal, ends, order[:soft], exact, draws=draws, generator=generator
@@ -228,7 +208,7 @@ def _drawn(
         lower, upper = edges[:, None, :-1], edges[:, None, 1:]
         middle = (lower + upper) / 2
         low, high, sigma = (
-            ends.tensor(end)[..., None] for end in (statement.low, statement.high, statement.sigma)
+            ends.tensor(end)[..., None] for end in (*statement.ends, statement.sigma)
         )
         if statement.sigma.any():
             likelihood = (upper - lower).log() - 0.5 * ((middle - low) / sigma).square()
@@ -312,9 +292,10 @@ def _check(statement: Known, scaling: Scaling, column: int) -> None:
     """
     target = scaling.targets[column]
     slack = _SLACK * (target.high - target.low)
-    inside = (statement.low >= target.low - slack) & (statement.high <= target.high + slack)
+    lows, highs = statement.ends
+    inside = (lows >= target.low - slack) & (highs <= target.high + slack)
     if not inside.any():
-        low, high = statement.low.min(), statement.high.max()
+        low, high = lows.min(), highs.max()
         extent = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
         raise InputError(
             f"the {target.about} is {extent} {target.unit}; the model was trained on "

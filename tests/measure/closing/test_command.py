@@ -180,10 +180,7 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_
     assert recipe.setup.pins == setup.pins
     assert recipe.setup.material is not None
     assert recipe.setup.material.name == "paper"
-    assert (recipe.setup.mass_known, recipe.setup.area_weight_uncertainty) == (
-        True,
-        pytest.approx(0.02),
-    )
+    assert recipe.setup.relative == pytest.approx(0.02)
     np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
     assert invoke(*given).code == 1  # the file is there
     again = invoke("close-loop", path, "--draft", tmp_path / "other.toml", "--json")
@@ -262,9 +259,12 @@ def test_recordings_of_one_name_get_names_that_differ(table: Path) -> None:
 
 
 def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup() -> None:
-    unweighed = Setup(mass_known=False)
+    unweighed = Setup(area_weight_uncertainty=None)
     setup = setup_of(unweighed, CloseLoopCommand(density_uncertainty=0.02))
-    assert (setup.mass_known, setup.area_weight_uncertainty) == (True, 0.02)
+    assert setup.relative == 0.02
+    weighed = replace(unweighed, area_weight=Stated.of("0.155±0.003"))
+    setup = setup_of(weighed, CloseLoopCommand(density_uncertainty=0.02))
+    assert (setup.area_weight, setup.relative) == (Stated.of(0.155), 0.02)
     assert setup_of(unweighed, CloseLoopCommand()) == unweighed
 
 
@@ -272,13 +272,13 @@ def test_a_weighed_cloth_has_the_weight_that_the_command_line_states() -> None:
     """N(0.155, 0.003²) is 1.94 % of its value; a range is uniform, of standard deviation width /
     √12."""
     given = CloseLoopCommand(material="paper", area_weight=Stated.of("0.155±0.003"))
-    setup = setup_of(Setup(mass_known=False), given)
-    assert (setup.area_weight, setup.mass_known) == (0.155, True)
-    assert setup.area_weight_uncertainty == pytest.approx(0.003 / 0.155)
+    setup = setup_of(Setup(area_weight_uncertainty=None), given)
+    assert setup.area_weight == given.area_weight
+    assert setup.relative == pytest.approx(0.003 / 0.155)
     between = setup_of(
         Setup(), CloseLoopCommand(material="paper", area_weight=Stated.of("0.15:0.16"))
     )
-    assert between.area_weight_uncertainty == pytest.approx(0.01 / math.sqrt(12) / 0.155)
+    assert between.relative == pytest.approx(0.01 / math.sqrt(12) / 0.155)
 
 
 @pytest.mark.parametrize(

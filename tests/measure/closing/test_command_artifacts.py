@@ -178,7 +178,7 @@ def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:
         experiment(moved),
         experiment(replace(specimen, stiffness=math.inf)),
         experiment(replace(specimen, area_weight_uncertainty=0.02)),
-        experiment(replace(specimen, mass_known=False)),
+        experiment(replace(specimen, area_weight_uncertainty=None)),
     ]
     (seen,) = experiment(specimen).recordings
     otherwise = (

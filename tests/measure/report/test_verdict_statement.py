@@ -169,7 +169,7 @@ def test_how_well_the_cloth_was_weighed_is_an_assumption(
 
 
 def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: LoopOutcome) -> None:
-    specimen = replace(outcome.experiment.specimen, mass_known=False)
+    specimen = replace(outcome.experiment.specimen, area_weight_uncertainty=None)
     assert not any(
         "area weight is known" in t
         for t in assumptions(replace(outcome.experiment, specimen=specimen))

@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.core.stated import Stated, parse
+from flagdata.core.stated import parse
 from flagdata.errors import InputError
 from models.networks.mixture import Mixture
-from models.networks.targets import Scaling
-from models.trained.restriction import ASPECT_SLACK, Known, restrict_mixtures
+from models.networks.targets import ASPECT, Scaling
+from models.trained.restriction import (
+    ASPECT_SLACK,
+    Known,
+    restrict_mixtures,
+    stated_aspect,
+)
 from tests.refusals import unrefused
 
 SCALING = Scaling(names=("wind_speed", "fabric_area_weight", "anisotropy"))
@@ -196,7 +201,10 @@ def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> Non
         location=torch.zeros((1, 1, 3), dtype=torch.float64),
         factor=torch.linalg.cholesky(covariance)[None, None],
     )
-    weighed, measured = _weighed("0.2", clips=1), Known.of_aspect(3.0, 2.0, count=1)
+    weighed, measured = (
+        _weighed("0.2", clips=1),
+        Known.everywhere(ASPECT, stated_aspect(3.0, 2.0), count=1),
+    )
     both = restrict_mixtures(
         mixture,
         scaling,
@@ -224,7 +232,7 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
     for text, impossible in (("0.2", {0.5: False, 4.0: False, 2.0: False}), ("0.36", {0.5: True})):
         stated = parse(text)
         values, log_mass = _given(
-            mixture, Known.stated("area_weight", stated, scale=scale), draws=10_000
+            mixture, Known(name="area_weight", statement=stated, scale=scale), draws=10_000
         )
         for factor in (0.5, 1.0, 2.0, 4.0):
             chosen = scale == factor
@@ -232,7 +240,9 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
             if not impossible.get(factor, False):
                 np.testing.assert_allclose(values[..., 1][chosen], stated.low / factor, rtol=1e-9)
     ranged, mass = _given(
-        mixture, Known.stated("area_weight", parse("0.2:0.3"), scale=scale), draws=10_000
+        mixture,
+        Known(name="area_weight", statement=parse("0.2:0.3"), scale=scale),
+        draws=10_000,
     )
     own = ranged[..., 1] * scale
     assert (own[scale > 0.5].min(), own[scale > 0.5].max()) == pytest.approx((0.2, 0.3), abs=0.002)
@@ -255,17 +265,22 @@ def test_a_statement_that_the_model_cannot_use_is_refused() -> None:
         _given(_mixture(), _weighed("0.1"), _weighed("0.2"))
 
 
-def test_ends_that_are_not_in_order_and_mixed_statements_are_refused() -> None:
-    def known(low: list[float], high: list[float], sigma: list[float]) -> Known:
-        return Known(
-            name="area_weight", low=np.array([low]), high=np.array([high]), sigma=np.array([sigma])
+def test_a_statement_is_scaled_to_the_network_and_a_scale_that_cannot_be_is_refused() -> None:
+    scale = np.array([[0.5], [2.0]])
+    for text, low, high, sigma in (
+        ("0.2", (0.4, 0.1), (0.4, 0.1), (0.0, 0.0)),
+        ("0.2±0.01", (0.4, 0.1), (0.4, 0.1), (0.02, 0.005)),
+        ("0.2:0.3", (0.4, 0.1), (0.6, 0.15), (0.0, 0.0)),
+    ):
+        known = Known(name="area_weight", statement=parse(text), scale=scale)
+        found = np.concatenate([*known.ends, known.sigma], axis=1).T
+        np.testing.assert_allclose(found, [low, high, sigma])
+    wrong = [(np.ones(3), "shape"), (np.array([[1.0, 0.0]]), "above 0")]
+    assert (
+        unrefused(
+            lambda given: Known(name="area_weight", statement=parse("0.2"), scale=given),
+            wrong,
+            InputError,
         )
-
-    assert known([0.1], [0.2], [0.0]).exact is False
-    cases = [
-        (([0.2], [0.1], [0.0]), "in order"),
-        (([0.1, 0.1], [0.1, 0.2], [0.0, 0.0]), "several ways"),
-        (([0.1], [0.2], [0.1]), "several ways"),
-    ]
-    assert unrefused(lambda ends: known(*ends), cases, InputError) == []
-    assert Known.everywhere("area_weight", Stated(low=0.1, high=0.1), count=3).low.shape == (3, 1)
+        == []
+    )

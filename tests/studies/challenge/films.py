@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.findings import Finding
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError, NotFoundError
 from flagdata.recipes.documents import read_json
 from measure.cloth import AZIMUTH, ELEVATION, Flag, Log, Normal, Observed, Uncertain
@@ -34,8 +35,7 @@ class Filmed:
         flag: its size; it is held at the corners of its hoist.
         azimuth, elevation: of the camera's axis to the wind, as they are stated.
         distance: of the camera [m].
-        area_weight: mean and standard deviation, of a cloth that was weighed [kg/m²]; None where it
-            was not.
+        area_weight: of a cloth that was weighed [kg/m²]; None where it was not.
         recordings: name → film and log beside it.
     """
 
@@ -43,7 +43,7 @@ class Filmed:
     azimuth: Uncertain
     elevation: Uncertain
     distance: float
-    area_weight: tuple[float, float] | None
+    area_weight: Stated | None
     recordings: Mapping[str, tuple[Path, Log]]
 
     def observed(self) -> tuple[tuple[Observed, ...], tuple[Finding, ...]]:
@@ -96,7 +96,11 @@ def read_films(folder: Path) -> Filmed:
             distance=float(camera["distance"]),
             area_weight=None
             if weighed is None
-            else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
+            else Stated(
+                low=float(weighed[0]),
+                high=float(weighed[0]),
+                sigma=float(weighed[0]) * float(weighed[1]),
+            ),
             recordings={
                 entry["name"]: (
                     beside[f"{entry['name']}.mp4"],

@@ -55,7 +55,7 @@ def test_sets_are_films_with_what_is_stated_beside_them(
     assert given.area_weight is not None
     from tests.studies.challenge.simulation import material_of
 
-    assert given.area_weight[0] == pytest.approx(material_of(sealed).area_weight, rel=0.12)
+    assert given.area_weight.middle == pytest.approx(material_of(sealed).area_weight, rel=0.12)
     for path, log in given.recordings.values():
         with av.open(str(path)) as film:
             shown = list(film.decode(video=0))

@@ -90,7 +90,7 @@ def setup(cloth: Cloth) -> Setup:
     return Setup(
         outline=sheet(cloth.width, cloth.height),
         material=cloth.material,
-        mass_known=False,
+        area_weight_uncertainty=None,
         pins=Hold.TOP_CORNERS,
         carried=True,
         vertices=VERTICES,

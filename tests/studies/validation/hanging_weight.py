@@ -121,7 +121,7 @@ def _film(film: LongFilm, model: Estimator, unstated: Measurement, stated: Measu
     prior = _width(answer.prior[:, column])
     (quantity,) = (quantity for quantity in unstated.quantities if quantity.name == WEIGHT)
     posterior = model.posterior(model.embeddings(model.inputs(film.windows)))
-    known = Known.stated(WIND, Stated.of(wind), scale=np.ones((1, 1)))
+    known = Known.everywhere(WIND, Stated.of(wind), count=1)
     restricted = model.given(posterior, (known,), seed=unstated.options.seed, draws=DRAWS)
     given = model.learners[0].scaling.values(restricted.logits).cpu().numpy()[0, :, column]
     low, high = np.quantile(given, [0.05, 0.95])

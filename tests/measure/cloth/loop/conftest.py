@@ -12,6 +12,7 @@ import pytest
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
+from flagdata.core.stated import Stated
 from measure.cloth import (
     OBSERVED,
     CalibrationOptions,
@@ -147,10 +148,11 @@ def options(
     *,
     kinds: int = 40,
     only: tuple[str, ...] = EFFECTS,
-    area_weight: tuple[float, float] | None = None,
+    area_weight: str | None = None,
 ) -> FilmLoopOptions:
     """Of a flag seen from a stated azimuth."""
     calibration = CalibrationOptions(
         flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=128
     )
-    return FilmLoopOptions(calibration=calibration, kinds=kinds, only=only, area_weight=area_weight)
+    weight = None if area_weight is None else Stated.of(area_weight)
+    return FilmLoopOptions(calibration=calibration, kinds=kinds, only=only, area_weight=weight)

@@ -119,7 +119,10 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--wind", "5"), "films and tables of observables"),
         (("--flag-size", "1.5x1.0", "--pins", "top-corners"), "top-corners"),
         (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
-        (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
+        (
+            ("--flag-size", "1.5x1.0", "--area-weight", "0"),
+            "null experiments have flags of 0.05 to 0.45",
+        ),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
         (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
         (("--flag-size", "1.5x1.0", "--material", "bunting"), "woven-polyester, woven-cotton"),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.stated import Stated
 from measure.cloth import FlagBatch, close_loop, design, simulations
 from measure.report import as_document
 from tests.measure.cloth.loop.conftest import options, readings, recording
@@ -62,7 +63,7 @@ def test_another_verdict_on_the_same_recordings_simulates_nothing_and_more_kinds
     made.clear()
     close_loop(
         recordings,
-        replace(options(kinds=KINDS), level=0.2, area_weight=(0.2, 0.01)),
+        replace(options(kinds=KINDS), level=0.2, area_weight=Stated.of("0.2±0.01")),
         folder=tmp_path,
     )
     assert made == []

@@ -53,8 +53,9 @@ def test_a_weight_that_no_null_flag_has_is_refused_before_anything_is_simulated(
     weight: float,
 ) -> None:
     with pytest.raises(UsageError, match=r"null experiments have flags of 0\.05 to 0\.45"):
-        options(area_weight=(weight, 0.05 * weight))
-    assert options(area_weight=(0.6, 0.03)).area_weight == (0.6, 0.03)
+        options(area_weight=f"{weight}±{0.05 * weight}")
+    assert options(area_weight="0.6±0.03").recipe()["area_weight"] == [0.6, 0.03]
+    assert options(area_weight="0.6").recipe()["area_weight"] == pytest.approx([0.6, 0.006])
 
 
 def test_flags_on_which_nothing_acts_need_no_effect_but_at_the_level(
@@ -173,8 +174,10 @@ def test_a_cloth_that_is_heavier_than_it_was_weighed_is_not_the_base_model(
     cheap: list[int], plain: Verdict, tmp_path: Path
 ) -> None:
     recordings, own = both(), plain.parameters[0].before.value
-    right = close_loop(recordings, options(area_weight=(own, 0.02 * own)), folder=tmp_path)
-    wrong = close_loop(recordings, options(area_weight=(0.5 * own, 0.01 * own)), folder=tmp_path)
+    right = close_loop(recordings, options(area_weight=f"{own}±{0.02 * own}"), folder=tmp_path)
+    wrong = close_loop(
+        recordings, options(area_weight=f"{0.5 * own}±{0.01 * own}"), folder=tmp_path
+    )
     assert right.conclusion is Conclusion.SUFFICIENT
     assert wrong.test.p_value.value <= 0.05
 
