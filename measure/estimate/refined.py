@@ -57,7 +57,7 @@ def refine_window(
         seed=options.seed,
         level=options.level,
         cache=cache,
-        area_weight=None if area_weight is None else _range_searched(area_weight, s),
+        area_weight=None if area_weight is None else _searched_range(area_weight, s),
         aspect=None
         if options.size is None or ASPECT not in options.stated(model)
         else options.size.aspect,
@@ -65,7 +65,7 @@ def refine_window(
     return scale_refinement(refinement, s)
 
 
-def _range_searched(area_weight: Stated, s: float) -> Stated:
+def _searched_range(area_weight: Stated, s: float) -> Stated:
     """Returns the range of area weights searched for a flag of s times the size [kg/m²]: two
     standard deviations either way of what was stated, or 1 % either way of an exact value, since a
     search needs a width."""

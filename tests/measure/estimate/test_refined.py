@@ -129,6 +129,10 @@ def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_p
 
 def test_an_area_weight_is_searched_as_a_range_at_the_size_that_is_simulated() -> None:
     # Two standard deviations either way, 1 % of a value; a flag twice as long weighs twice as much.
-    assert _searched_range(parse("0.12:0.15"), 1.0) == pytest.approx((0.12, 0.15))
-    assert _searched_range(parse("0.28±0.01"), 2.0) == pytest.approx((0.13, 0.15))
-    assert _searched_range(parse("0.2"), 1.0) == pytest.approx((0.198, 0.202))
+    for text, scale, ends in (
+        ("0.12:0.15", 1.0, (0.12, 0.15)),
+        ("0.28±0.01", 2.0, (0.13, 0.15)),
+        ("0.2", 1.0, (0.198, 0.202)),
+    ):
+        searched = _searched_range(parse(text), scale)
+        assert (searched.low, searched.high, searched.sigma) == pytest.approx((*ends, 0.0))
