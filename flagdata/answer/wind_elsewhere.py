@@ -102,7 +102,10 @@ def compare_winds(
     """
     if is_bound:
         return WindComparison(stated=stated, difference=None, level=level)
-    elsewhere = stated.draw(stream(seed, "wind-elsewhere"), len(wind))
+    generator = stream(seed, "wind-elsewhere")
+    elsewhere = generator.uniform(
+        stated.low, stated.high, len(wind)
+    ) + stated.sigma * generator.standard_normal(len(wind))
     low, high = np.quantile(wind - elsewhere, [(1 - level) / 2, (1 + level) / 2]).tolist()
     return WindComparison(stated=stated, difference=(low, high), level=level)
 
