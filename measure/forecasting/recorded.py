@@ -17,13 +17,13 @@ _DIRECTION = math.radians(2.0)
 
 def recorded(specimen: Specimen, parts: Iterable[Trajectory | Segment]) -> frozenset[Need]:
     """Lists what recordings of a specimen have, or their segments, and what is stated of them."""
-    parts = list(parts)
+    parts, uncertainty = list(parts), specimen.area_weight_uncertainty
     has = {
         Need.MARKERS: True,
         Need.FREE_HOIST: bool({*full_hoist(specimen.mesh.rest)} - {*specimen.held}),
         Need.STILL: all(part.attachments is None for part in parts),
         Need.TURBULENCE: not all(part.wind.steady for part in parts),
-        Need.AREA_WEIGHT: specimen.mass_known and specimen.area_weight_uncertainty <= _WEIGHT,
+        Need.AREA_WEIGHT: uncertainty is not None and uncertainty <= _WEIGHT,
         Need.DIRECTION: all(part.wind.direction <= _DIRECTION for part in parts),
         Need.ANCHORS: specimen.anchors_given,
     }
