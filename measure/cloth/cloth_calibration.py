@@ -279,7 +279,7 @@ def calibrate(
         left_out: a warning for each recording of it that cannot be used.
         folder: where simulations are kept.
         workers: processes that simulate.
-        advance: called with the number of flags that were simulated or found.
+        advance: called with the seconds of flags that were simulated or found.
 
     Raises:
         InputError: see `Observed` and `designs_of`.

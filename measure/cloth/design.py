@@ -17,18 +17,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from flagdata.core import workload
 from flagdata.core.arrays import FloatArray, IntArray, read_arrays
-from flagdata.core.console import say_beside_bars
-from flagdata.core.files.outputs import rewrite
 from flagdata.core.json_values import json_values
-from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, InputError
 from flagdata.recipes.typed_tables import Range, Scale
@@ -51,7 +47,7 @@ from measure.cloth.observed_recording import Observed, check_in_all
 from measure.forecasting.strengths import Strengths, on_films
 from measure.observables.observable import WINDOW
 from sim.effects.weighing import Need
-from sim.workers import connect_workers
+from sim.workers import Simulatable, simulate_missing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,29 +267,12 @@ def simulated_values(
 
     Args:
         folder: where batches are kept.
-        advance: called with the number of flags that were simulated or found.
+        advance: called with the seconds of flags that were simulated or found.
 
     Raises:
         CorruptError: a kept batch that cannot be read.
     """
     return readings_of(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
-
-
-class Simulatable(Protocol):
-    """Cloths that are simulated together and kept as one file."""
-
-    @property
-    def seeds(self) -> Sequence[int]:
-        """One for each cloth."""
-        ...
-
-    def content(self) -> Mapping[str, Any]:
-        """Returns all that the readings depend on, as JSON values."""
-        ...
-
-    def read(self) -> FloatArray:
-        """Simulates and reads them: (cloth, …)."""
-        ...
 
 
 def readings_of(
@@ -305,33 +284,8 @@ def readings_of(
 ) -> FloatArray:
     """Returns what batches read, (cloth, …) in order, of flags (flag, place, window, observable);
     those that the folder lacks are simulated. As `simulated_values`."""
-    paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
-    missing = [number for number, path in enumerate(paths) if not path.exists()]
-    if advance is not None and len(missing) < len(batches):
-        advance(
-            sum(
-                len(batch.seeds)
-                for number, batch in enumerate(batches)
-                if number not in set(missing)
-            )
-        )
-    folder.mkdir(parents=True, exist_ok=True)
-    if missing:
-        with connect_workers(None, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
-            for count in pool.results(
-                (_make, (batches[number], paths[number])) for number in missing
-            ):
-                if advance is not None:
-                    advance(count)
+    paths = simulate_missing(batches, folder=folder, workers=workers, advance=advance)
     return np.concatenate([_read(path) for path in paths])
-
-
-def _make(batch: Simulatable, path: Path) -> int:
-    """Simulates a batch into its file; returns how many cloths it has."""
-    buffer = BytesIO()
-    np.savez_compressed(buffer, readings=batch.read())
-    rewrite(path, buffer.getvalue())
-    return len(batch.seeds)
 
 
 def _read(path: Path) -> FloatArray:

@@ -252,6 +252,15 @@ class FlagBatch:
             content["discretisation"] = self.discretisation.content()
         return content
 
+    @property
+    def effort(self) -> int:
+        """Simulated seconds of all its flags."""
+        return round(len(self.seeds) * self._simulated_seconds)
+
+    def arrays(self) -> Mapping[str, FloatArray]:
+        """Simulates and observes it; see `read`."""
+        return {"readings": self.read()}
+
     def read(self) -> FloatArray:
         """Simulates and observes (flag, place, window, observable), NaN where a window does not
         show one or a flag diverged."""

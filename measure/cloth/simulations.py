@@ -103,7 +103,7 @@ def simulate_all(
     )
 
     def all_of(label: str, batches: list) -> FloatArray:
-        total, done = sum(len(batch.seeds) for batch in batches), 0
+        total, done = sum(batch.effort for batch in batches), 0
 
         def advance(count: int) -> None:
             nonlocal done

@@ -231,7 +231,7 @@ def _weigh(
     from measure.cloth.calibrate_call import folder_of, options_of
     from measure.cloth.cloth_calibration import calibrate
     from measure.cloth.design import announce_simulations
-    from measure.cloth.numerics import FLAGS, effort
+    from measure.cloth.numerics import FLAGS, LASTING, effort
 
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
@@ -243,9 +243,11 @@ def _weigh(
         for recording in observed
     )
     say(announce_simulations(work, workers=workers))
-    with progress(
-        (options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag"
-    ) as advance:
+    seconds = sum(
+        options.simulations * recording.duration + FLAGS * min(LASTING, recording.duration)
+        for recording in observed
+    )
+    with progress(round(seconds), label="calibrate", unit="flag-second") as advance:
         calibration = calibrate(
             observed,
             options,

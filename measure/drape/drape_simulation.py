@@ -163,6 +163,15 @@ class DrapeBatch:
         system, state = apply([RestCurvature(curvature=curl)], system, state)
         return at_rest(system, state, limit=LIMIT).position.double().numpy()
 
+    @property
+    def effort(self) -> int:
+        """Number of drapes."""
+        return len(self.seeds)
+
+    def arrays(self) -> Mapping[str, FloatArray]:
+        """Simulates and measures them; see `read`."""
+        return {"readings": self.read()}
+
     def read(self) -> FloatArray:
         """Simulates and measures them: (drape, 7), see `Shape.numbers`."""
         made, rim = mesh(self.rows)

@@ -1,5 +1,5 @@
-"""Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on
-where it was.
+"""Banks of null recordings: the statistics of null experiments, kept by the hash of all that shapes
+each.
 
 A bank is of one design: one nominal cloth, its markers, their noise and the rate. It serves all
 recordings of that design, and none of another: of 33 sets of one effect a test by 48 kinds of their
@@ -10,21 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from io import BytesIO
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flagdata.core.arrays import FloatArray, read_arrays
-from flagdata.core.console import say_beside_bars
-from flagdata.core.files.outputs import rewrite
-from flagdata.core.numbered import read_bounded
-from flagdata.core.provenance import code_version
+from flagdata.core.arrays import AnyArray, FloatArray, read_arrays
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, NotFoundError, UsageError
-from flagdata.recipes.typed_tables import SEED_LIMIT
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, columns, names
@@ -39,18 +33,19 @@ from measure.probes.wind_course import Course
 from measure.trajectories.attachment_anchors import as_seen
 from measure.trajectories.trajectory import Specimen, Trajectory
 from sim.integrate.split import SplitEuler
-from sim.workers import connect_workers
+from sim.workers import kept_file, simulate_missing
 
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What
 experiments leave differs by their numerics more than by the cloth, and only kinds count in the
 test, so that each has one cloth."""
-_VERSION = 6
+_VERSION = 7
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by
 its logarithm;
 3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether
 cloths are carried;
-6: the inertia of air at the ends of a cloth."""
+6: the inertia of air at the ends of a cloth; 7: each batch named by the hash of all that shapes it,
+in place of its number."""
 _SEGMENTS = (
     "recording",
     "r",
@@ -164,6 +159,66 @@ def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[FloatAr
     return [anchors[cloth] for cloth in batch.calibrations]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BankedNulls:
+    """A null experiment as it is kept: its statistics along all columns.
+
+    Attributes:
+        batch: that is simulated.
+    """
+
+    batch: NullBatch
+
+    @property
+    def effort(self) -> int:
+        """See `NullBatch.effort`."""
+        return self.batch.effort
+
+    def content(self) -> Mapping[str, Any]:
+        """Returns all that its statistics depend on."""
+        return {"nulls": _VERSION, "columns": list(names()), "batch": self.batch.identity()}
+
+    def arrays(self) -> Mapping[str, AnyArray]:
+        """Simulates it and takes its statistics, each with a row for each segment."""
+        nulls, duration = evaluate(self.batch, 0, columns())
+        measured = nulls.statistics
+        if (
+            measured.lines is None
+            or measured.turning is None
+            or measured.course is None
+            or measured.settled is None
+        ):
+            raise UsageError(
+                "the batch has no spectra, moments, courses or settled quantities",
+                where="null bank",
+                fix="take statistics by `evaluate`",
+            )
+        return {
+            "version": np.array(_VERSION),
+            "columns": np.array(names()),
+            "recording": measured.recording,
+            "r": measured.r,
+            "response": measured.response,
+            "error": measured.error,
+            "marker_error": measured.marker_error,
+            "lines": measured.lines,
+            "speeds": nulls.speeds,
+            "calibration": nulls.calibration,
+            "noise": nulls.noise,
+            "period": nulls.period,
+            "cloth": nulls.cloth,
+            "duration": np.array(duration),
+            "anchors_told": np.array(self.batch.specimen.anchors_given),
+            "carried": np.array(bool(self.batch.tracks)),
+            "turned": measured.turning.r,
+            "turning": measured.turning.response,
+            "moment": measured.turning.error,
+            "course": measured.course.score,
+            "course_curvature": measured.course.curvature,
+            "settled": measured.settled,
+        }
+
+
 def build(
     folder: Path,
     batches: Sequence[NullBatch],
@@ -172,82 +227,18 @@ def build(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so
-    that no worker is left alone with one.
+    """Evaluates the batches that the folder lacks; as `sim.workers.simulate_missing`.
 
     Args:
-        workers: processes on this machine.
-        scheduler: address of a Dask scheduler, whose workers are taken instead.
-        progress: called with the number of batches done.
-
-    Raises:
-        NotFoundError: no scheduler answers there, or it has no workers.
-        WorkerError: workers kept dying, or are gone.
+        progress: called with the effort of the batches that are done.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    missing = [index for index in range(len(batches)) if not _file(folder, index).exists()]
-    missing.sort(key=lambda index: -batches[index].effort)
-    if progress is not None:
-        progress(len(batches) - len(missing))
-    if not missing:
-        return
-    with connect_workers(
-        scheduler, workers=min(workers, len(missing)), say=say_beside_bars
-    ) as pool:
-        for index, content in pool.results(
-            (_content_of, (batches[index], index)) for index in missing
-        ):
-            rewrite(_file(folder, index), content)
-            if progress is not None:
-                progress(1)
-
-
-def _content_of(batch: NullBatch, index: int) -> tuple[int, bytes]:
-    """Evaluates a batch; returns its number and the bytes of its file."""
-    nulls, duration = evaluate(batch, index, columns())
-    measured = nulls.statistics
-    if (
-        measured.lines is None
-        or measured.turning is None
-        or measured.course is None
-        or measured.settled is None
-    ):
-        raise UsageError(
-            "the batch has no spectra, moments, courses or settled quantities",
-            where="null bank",
-            fix="take statistics by `evaluate`",
-        )
-    buffer = BytesIO()
-    np.savez(
-        buffer,
-        version=np.array(_VERSION),
-        columns=np.array(names()),
-        recording=measured.recording,
-        r=measured.r,
-        response=measured.response,
-        error=measured.error,
-        marker_error=measured.marker_error,
-        lines=measured.lines,
-        speeds=nulls.speeds,
-        calibration=nulls.calibration,
-        noise=nulls.noise,
-        period=nulls.period,
-        cloth=nulls.cloth,
-        duration=np.array(duration),
-        anchors_told=np.array(batch.specimen.anchors_given),
-        carried=np.array(bool(batch.tracks)),
-        turned=measured.turning.r,
-        turning=measured.turning.response,
-        moment=measured.turning.error,
-        course=measured.course.score,
-        course_curvature=measured.course.curvature,
-        settled=measured.settled,
+    simulate_missing(
+        [BankedNulls(batch=batch) for batch in batches],
+        folder=folder,
+        workers=workers,
+        scheduler=scheduler,
+        advance=progress,
     )
-    return index, buffer.getvalue()
-
-
-def _file(folder: Path, index: int) -> Path:
-    return folder / f"nulls-{index:04d}.npz"
 
 
 def _content(path: Path) -> Mapping[str, np.ndarray]:
@@ -260,7 +251,9 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         )
     if content["version"].ravel().tolist() != [_VERSION]:
         raise CorruptError(
-            "its arrays are those of another version", where=str(path), fix="build the bank again"
+            "its arrays are those of another version",
+            where=str(path),
+            fix="build the bank again, into a folder that is not there yet",
         )
     if tuple(content["columns"].ravel().tolist()) != names():
         raise CorruptError(
@@ -283,38 +276,27 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
     return content
 
 
-def _number(path: Path) -> int:
-    number = read_bounded(path.stem.partition("-")[2], most=SEED_LIMIT)
-    if number is None:
-        raise CorruptError(
-            "it is not a file of a bank", where=str(path), fix="move it out of the folder"
-        )
-    return number
-
-
 def files(folder: Path) -> list[Path]:
     """Lists the batches of a folder."""
-    return sorted(folder.glob("nulls-*.npz"))
+    return sorted(folder.glob("*.npz"))
 
 
-def version_of_content() -> dict[str, Any]:
-    """Identifies what the arrays of a batch are, beside its design: nulls of another version are
-    none of these."""
-    return {"version": _VERSION, "columns": list(names()), "code": code_version()}
-
-
-def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
+def load(folder: Path, *, words: str, batches: Sequence[NullBatch] | None = None) -> NullBank:
     """Loads the bank of a folder.
 
     Args:
-        kinds: how many of its kinds, the first; None for all.
+        batches: of the folder, those that are taken; None for all that it has.
 
     Raises:
         NotFoundError: no batches there.
         CorruptError: a file that cannot be read, or of other columns.
         InputError: too few batches.
     """
-    paths = files(folder)[:kinds]
+    paths = (
+        files(folder)
+        if batches is None
+        else [kept_file(BankedNulls(batch=batch), folder) for batch in batches]
+    )
     if not paths:
         raise NotFoundError(
             "the folder holds no null recordings", where=str(folder), fix="build the bank first"
@@ -324,7 +306,7 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     anchors_given: set[bool] = set()
     carried: set[bool] = set()
     count = 0
-    for path in paths:
+    for kind, path in enumerate(paths):
         content = _content(path)
         measured = Statistics(
             recording=content["recording"] + count,
@@ -343,7 +325,7 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
             course=Course(score=content["course"], curvature=content["course_curvature"]),
             settled=content["settled"],
         )
-        numerics = np.full(len(measured.r), _number(path))
+        numerics = np.full(len(measured.r), kind)
         parts.append(
             Nulls(
                 statistics=measured,

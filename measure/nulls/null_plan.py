@@ -10,7 +10,6 @@ import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.files.caches import user_cache
-from flagdata.core.provenance import array_hash, recipe_hash
 from flagdata.core.rng import child_seed
 from flagdata.errors import InputError, UsageError
 from measure.forecasting.setting import Setting, Stage
@@ -19,7 +18,6 @@ from measure.nulls import tracks, winds
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank
-from measure.trajectories.trajectory import describe_cloth
 from measure.verdict.criteria import CRITERIA
 
 _CARRIED = ", carried along the recordings' own ways from other instants on"
@@ -239,43 +237,21 @@ def simulate_bank(
     stage: Stage,
     scheduler: str | None = None,
 ) -> NullBank:
-    """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design:
-    what is there already is not simulated anew, and a build that was stopped goes on."""
+    """Simulates a bank of `batches`, kept in the user's cache folder, each by the hash of all that
+    shapes it: what is there already is not simulated anew, and a build that was stopped goes on."""
     wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
-    done = 0
+    total, done = sum(batch.effort for batch in wanted), 0
 
     def count(finished: int) -> None:
         nonlocal done
         done += finished
-        stage(f"nulls of {len(wanted)} kinds", done, len(wanted))
+        stage(f"nulls of {len(wanted)} kinds", done, total)
 
-    folder = kept_in(setting, seed=seed)
+    folder = user_cache() / "nulls"
     banks.build(folder, wanted, workers=workers, scheduler=scheduler, progress=count)
-    total = banks.WINDS * len(wanted)
-    words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
+    words = (
+        f"{banks.WINDS * len(wanted)} recordings of {len(wanted)} meshes and methods, over the "
+        "priors of the cloth"
+    )
     words += _CARRIED if setting.experiment.carried else ""
-    return banks.load(folder, words=words, kinds=len(wanted))
-
-
-def kept_in(setting: Setting, *, seed: int) -> Path:
-    """Returns the folder of the nulls of an experiment's design, by a seed and by this version of
-    the code."""
-    identity = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
-    return user_cache() / "nulls" / recipe_hash(identity)[:32]
-
-
-def design_hash(setting: Setting) -> str:
-    """Hashes all of an experiment that shapes its nulls, SHA-256: cloth, markers, rate, noise,
-    lengths, winds and ways."""
-    segments, recordings = setting.segments, setting.experiment.recordings
-    content, arrays = describe_cloth(setting.experiment.specimen)
-    del content["density-uncertainty"]  # nulls are judged under it, not made by it
-    content |= {
-        "period": segments.period,
-        "noise": setting.design.noise,
-        "segments": len(segments),
-        "lengths": [float(r.times[-1]) for r in recordings],
-    }
-    blown = [part for r in recordings for part in (r.wind.times, r.wind.velocity)]
-    ways = [r.attachments for r in recordings if r.attachments is not None]
-    return array_hash(content, [*arrays, segments.markers, *blown, *ways])
+    return banks.load(folder, words=words, batches=wanted)

@@ -9,20 +9,27 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 import torch
 from scipy.spatial import Delaunay
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.provenance import array_hash
 from flagdata.core.rng import stream
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.nulls.stiffness import StiffnessFactors
 from measure.trajectories.attachment_anchors import carry_attachments
 from measure.trajectories.interpolation import onto
-from measure.trajectories.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
+from measure.trajectories.trajectory import (
+    AttachmentTrack,
+    Specimen,
+    Trajectory,
+    WindTrack,
+    describe_cloth,
+)
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
 from sim.cloth.mesh import Diagonals, Mesh, grid
@@ -116,11 +123,36 @@ class NullBatch:
             else trajectories
         )
 
+    def identity(self) -> str:
+        """Hashes all that shapes its recordings, SHA-256."""
+        cloth, arrays = describe_cloth(self.specimen)
+        del cloth["density-uncertainty"]  # nulls are judged under it, not made by it
+        content = cloth | {
+            "rate": self.rate,
+            "duration": self.duration,
+            "noise": self.noise,
+            "calibrations": [asdict(own) for own in self.calibrations],
+            "speeds": list(self.speeds),
+            "seed": self.seed,
+            "stiffness": asdict(self.stiffness),
+            "effects": [repr(effect) for effect in self.effects],
+            "moving": [len(self.winds), len(self.tracks)],
+        }
+        blown = [part for wind in self.winds for part in (wind.times, wind.velocity)]
+        ways = [part for track in self.tracks for part in (track.times, track.places)]
+        return array_hash(content, [*arrays, self.markers, *blown, *ways])
+
     @property
-    def effort(self) -> float:
-        """About how much work it is, in vertices: explicit steps take twice as long."""
+    def effort(self) -> int:
+        """About how much work it is, in simulated seconds of all vertices: explicit steps take
+        twice as long."""
         integrator, _ = self._method()
-        return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
+        seconds = len(self.speeds) * (SETTLE + self.duration)
+        return round(
+            seconds
+            * self._mesh()[0].vertex_count
+            * (2 if isinstance(integrator, Symplectic) else 1)
+        )
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
         """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments:

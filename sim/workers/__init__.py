@@ -15,6 +15,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from sim.workers.connect import connect_workers
     from sim.workers.jobs import Job, WorkerError, Workers
+    from sim.workers.kept_simulations import Simulatable, kept_file, simulate_missing
     from sim.workers.local import LocalWorkers, single_threaded
     from sim.workers.scheduled import Scheduled
 

@@ -75,12 +75,10 @@ ALLOWED = {
     "in",
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever "
     "folder it is in",
-    "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; "
-    "batches by put_if_absent",
     "measure/cloth/calibration_artifact.py": LAKE,
     "measure/measuring_model/reading_model_folder.py": LAKE,
-    "measure/cloth/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever "
-    "folder it is in",
+    "sim/workers/kept_simulations.py": "a cache: files named by 32 hex digits, by put_if_absent, "
+    "whichever folder it is in",
     "sim/compiler.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
     "models/trained/model_folder.py": "writes into folders that its callers make: staging, a run "

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from measure.nulls import GroupedConformal, NullBank, NullBatch, null_plan
 from measure.nulls import bank as banks
 from measure.probes.statistics import Statistics
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
+from sim.workers import kept_file
 
 
 @pytest.fixture
@@ -32,40 +32,44 @@ def asked(
     *,
     nulls: int = 160,
     seed: int = 0,
-) -> tuple[Path, int, int | None]:
-    """Folder, batches built and kinds read of a simulated bank."""
-    found: list[tuple[Path, int]] = []
+) -> list[Path]:
+    """Files that a simulated bank is kept in and read from."""
+    found: list[Path] = []
 
-    def build(folder: Path, batches: Sequence[NullBatch], **_: object) -> None:
-        found.append((folder, len(batches)))
+    def simulate(batches: Sequence[banks.BankedNulls], *, folder: Path, **_: object) -> None:
+        found.extend(kept_file(batch, folder) for batch in batches)
+
+    def load(folder: Path, *, words: str, batches: Sequence[NullBatch]) -> list[Path]:
+        return [kept_file(banks.BankedNulls(batch=batch), folder) for batch in batches]
 
     monkeypatch.setenv("FLAGDATA_CACHE", str(cache))
-    monkeypatch.setattr(banks, "build", build)
-    monkeypatch.setattr(banks, "load", lambda folder, words, kinds: SimpleNamespace(kinds=kinds))
+    monkeypatch.setattr(banks, "simulate_missing", simulate)
+    monkeypatch.setattr(banks, "load", load)
     bank = null_plan.simulate_bank(
         setting, nulls=nulls, seed=seed, workers=1, stage=lambda *_: None
     )
-    ((folder, count),) = found
-    return folder, count, bank.kinds  # pyright: ignore[reportAttributeAccessIssue]
+    assert bank == found
+    return found
 
 
 def test_nulls_are_kept_by_their_design(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, setting: Setting
 ) -> None:
-    folder, count, read = asked(monkeypatch, tmp_path, setting)
-    assert folder.parent == tmp_path / "nulls"
-    assert (count, read) == (40, 40)
+    usual = asked(monkeypatch, tmp_path, setting)
+    assert {path.parent for path in usual} == {tmp_path / "nulls"}
+    assert len(set(usual)) == 40
     # More of the same design are added to them; what the weight is known to does not shape them.
-    assert asked(monkeypatch, tmp_path, setting, nulls=320) == (folder, 80, 80)
+    more = asked(monkeypatch, tmp_path, setting, nulls=320)
+    assert (more[:40], len(set(more))) == (usual, 80)
     weighed = replace(
         setting.experiment,
         specimen=replace(setting.experiment.specimen, area_weight_uncertainty=0.02),
     )
-    assert asked(monkeypatch, tmp_path, replace(setting, experiment=weighed))[0] == folder
+    assert asked(monkeypatch, tmp_path, replace(setting, experiment=weighed)) == usual
     noisy = tuple(replace(r, noise=2e-3) for r in setting.experiment.recordings)
     other = Setting.of(replace(setting.experiment, recordings=noisy))
-    assert asked(monkeypatch, tmp_path, other)[0] != folder
-    assert asked(monkeypatch, tmp_path, setting, seed=1)[0] != folder
+    assert not set(asked(monkeypatch, tmp_path, other)) & set(usual)
+    assert not set(asked(monkeypatch, tmp_path, setting, seed=1)) & set(usual)
 
 
 def like(setting: Setting, **changed: Any) -> NullBank:

@@ -167,7 +167,8 @@ def bank(
     for design in made:
         claim(design, seed=seed)
     say(of_batches([batch for design in made for batch in design.batches], workers=workers))
-    with progress(kinds * len(made), label="null recordings", unit="kind") as advance:
+    work = sum(batch.effort for design in made for batch in design.batches)
+    with progress(work, label="null recordings", unit="vertex-second") as advance:
         for design in made:
             banks.build(
                 design.folder,

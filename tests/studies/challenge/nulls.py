@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flagdata.core.files.outputs import check_folder
-from flagdata.core.provenance import code_version, recipe_hash
+from flagdata.core.provenance import code_version
 from flagdata.core.rng import child_seed
 from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Lake
@@ -26,13 +26,11 @@ class DesignNulls:
     Attributes:
         folder: that they are built into.
         title: of what they are made from.
-        recipe: hash of all that shapes them.
         batches: one a kind.
     """
 
     folder: Path
     title: str
-    recipe: str
     batches: list[NullBatch]
 
 
@@ -70,7 +68,6 @@ def nulls_of_sets(
         DesignNulls(
             folder=folder / design,
             title=f"{title}: {design}",
-            recipe=recipe_hash({"sets": [null_plan.design_hash(one) for one in alike]}),
             batches=null_plan.batches(*alike, kinds=kinds, seed=child_seed(seed, design)),
         )
         for design, alike in sorted(settings.items())
@@ -93,7 +90,6 @@ def nulls_of_recordings(
     return DesignNulls(
         folder=folder,
         title=experiment.title,
-        recipe=null_plan.design_hash(setting),
         batches=null_plan.batches(setting, kinds=kinds, seed=seed),
     )
 
@@ -106,7 +102,8 @@ def claim(nulls: DesignNulls, *, seed: int) -> None:
         ConflictError: the folder's are of another recipe or seed, or the folder holds something
             else.
     """
-    folder, made = nulls.folder, {"recipe": nulls.recipe, "title": nulls.title, "seed": seed}
+    folder = nulls.folder
+    made = {"recipe": nulls.batches[0].identity(), "title": nulls.title, "seed": seed}
     path = folder / "bank.json"
     if not path.exists():
         check_folder(folder)

@@ -101,13 +101,13 @@ def test_a_set_is_judged_by_the_nulls_of_its_design(
 
 
 def test_a_folder_goes_on_with_its_own_nulls_alone(made: ChallengeFolder, tmp_path: Path) -> None:
-    (design, _) = nulls.nulls_of_sets(tmp_path, made, seed=5, kinds=1)
+    design, other = nulls.nulls_of_sets(tmp_path, made, seed=5, kinds=1)
     nulls.claim(design, seed=5)
     nulls.claim(design, seed=5)
     with pytest.raises(ConflictError, match="seed 5, not 6"):
         nulls.claim(design, seed=6)
     with pytest.raises(ConflictError, match="recipe"):
-        nulls.claim(replace(design, recipe="of other sets"), seed=5)
+        nulls.claim(replace(design, batches=other.batches), seed=5)
 
 
 @pytest.fixture

@@ -33,6 +33,7 @@ from flagdata.lake import Artifact, Lake, catalog, expire
 from measure.cloth import design
 from measure.nulls import bank
 from measure.refine import evaluator
+from sim.workers import kept_file
 from tests.flagdata.lake.conftest import put_older_ref
 
 OUTCOMES = ("refused", "same")
@@ -144,7 +145,7 @@ def of_a_bank(folder: Path) -> Kept:
 class Asked:
     """A batch of simulations that were kept."""
 
-    seeds: tuple[int, ...] = (1,)
+    effort: int = 1
 
     def content(self) -> Mapping[str, Any]:
         return {"what": "a batch"}
@@ -154,7 +155,7 @@ def of_simulations(folder: Path) -> Kept:
     """The kept readings of simulated films."""
     place = folder / "simulations"
     asked: Any = [Asked()]
-    path = place / f"{design.digest(design.canonical(dict(asked[0].content())))[:32]}.npz"
+    path = kept_file(asked[0], place)
     place.mkdir()
     np.savez_compressed(path, readings=np.random.default_rng(2).normal(size=(2, 1, 8, 4)))
     return Kept(files=[path], read=lambda: design.readings_of(asked, folder=place).tolist())

@@ -20,6 +20,7 @@ import torch
 from scipy.interpolate import CubicSpline
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.files.caches import user_cache
 from flagdata.core.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
@@ -200,11 +201,10 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 
 def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     """By `KINDS` kinds of nulls of an experiment's own ways."""
-    setting = Setting.of(experiment)
-    null_plan.simulate_bank(
-        setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None
-    )
-    return LoopOptions(seed=seed, bank=null_plan.kept_in(setting, seed=seed))
+    wanted = null_plan.batches(Setting.of(experiment), kinds=KINDS, seed=seed)
+    folder = user_cache() / "nulls" / wanted[0].identity()[:32]
+    banks.build(folder, wanted, workers=2)
+    return LoopOptions(seed=seed, bank=folder)
 
 
 def _places(cloth: Cloth) -> FloatArray:
