@@ -21,7 +21,7 @@ from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Column, columns, names
+from measure.forecasting.regressors import Column, EffectColumn, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import Nulls
 from measure.nulls import stiffness
@@ -176,7 +176,13 @@ class BankedNulls:
 
     def content(self) -> Mapping[str, Any]:
         """Returns all that its statistics depend on."""
-        return {"nulls": _VERSION, "columns": list(names()), "batch": self.batch.identity()}
+        along = [
+            [column.name, column.step, dict(column.shapes), column.revision]
+            if isinstance(column, EffectColumn)
+            else [column.name]
+            for column in columns()
+        ]
+        return {"nulls": _VERSION, "columns": along, "batch": self.batch.identity()}
 
     def arrays(self) -> Mapping[str, AnyArray]:
         """Simulates it and takes its statistics, each with a row for each segment."""

@@ -12,10 +12,10 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.forecasting import Setting
-from measure.inference.random_effect import Nulls
+from measure.inference import Nulls
 from measure.nulls import GroupedConformal, NullBank, NullBatch, null_plan
 from measure.nulls import bank as banks
-from measure.probes.statistics import Statistics
+from measure.probes import Statistics
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 from sim.workers import kept_file
 

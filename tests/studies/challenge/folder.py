@@ -26,8 +26,14 @@ from flagdata.core.provenance import canonical, digest, file_hash
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.recipes.documents import read_json
 from flagdata.recipes.shelves import is_name
-from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack, as_seen
-from measure.trajectories.trajectory import AREA_WEIGHT_UNCERTAINTY
+from measure.trajectories import (
+    AREA_WEIGHT_UNCERTAINTY,
+    Experiment,
+    Specimen,
+    Trajectory,
+    WindTrack,
+    as_seen,
+)
 from sim.cloth.handles import corners
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
