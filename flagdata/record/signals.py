@@ -43,6 +43,12 @@ class Sensor:
     accuracy: NotNegative | None = None
     accuracy_relative: NotNegative | None = None
 
+    @property
+    def words(self) -> str:
+        """Its name, and its height where that is known."""
+        height = "" if self.height is None else f", {self.height:g} m above ground"
+        return f"{self.name}{height}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class WindSeries:

@@ -165,7 +165,8 @@ def made(
             advance(count)
 
     def look(subject: Subject) -> Recording:
-        return windows_of_recording(subject, reader, size, first=first, last=last, advance=step)
+        part = {"first": first, "last": last}
+        return windows_of_recording(subject, reader, size, **part, lake=lake, advance=step)
 
     recordings, unread = usable(opened_subjects, look, name=lambda recording: recording.film.name)
     result = calibrate_reading(recordings, network=reader, size=size, level=level)

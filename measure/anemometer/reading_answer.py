@@ -10,6 +10,7 @@ from markupsafe import Markup
 from flagdata.answer import Array, Figure, Head, Section, Table
 from flagdata.answer.calibrated import Calibrated
 from flagdata.answer.charts import Axis, Band, Chart, Colour, Dots, Line, Panel
+from flagdata.answer.circumstances import list_circumstances
 from flagdata.core.findings import Severity
 from flagdata.core.shell import command_line
 from flagdata.pages.page_pictures import moving
@@ -138,12 +139,11 @@ def _percent(result: ReadingCalibration) -> str:
 
 def _facts(result: ReadingCalibration) -> dict[str, str]:
     size, model = result.model.size, result.model
-    sensors = dict.fromkeys(one.sensor.name for one in result.recordings)
     return {
         "recordings": ", ".join(one.name for one in result.recordings),
+        **list_circumstances([one.circumstances for one in result.recordings]),
         "windows": f"{result.windows} of {model.step:.2g} s",
         "flag": f"{size.length:g} m × {size.height:g} m",
-        "anemometer": ", ".join(sensors),
         "clock": _clock(result),
     }
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.findings import Finding
 from flagdata.errors import InputError, RefusedError
+from flagdata.lake import Lake
 from flagdata.record.signals import Sensor
 from measure.cloth.blown_wind import STEADY, Log
 from measure.film.film_source import Subject
@@ -55,6 +57,7 @@ class Recording:
         log: its times since the film's first frame.
         sensor: that logged.
         findings: on the film.
+        circumstances: when, where and with what it was recorded.
     """
 
     JSON_NAMES: ClassVar[tuple[str, ...]] = (
@@ -72,6 +75,7 @@ class Recording:
     log: Log
     sensor: Sensor
     findings: tuple[Finding, ...] = ()
+    circumstances: Circumstances = field(default_factory=Circumstances)
 
     @property
     def usable(self) -> BoolArray:
@@ -163,12 +167,14 @@ def windows_of_recording(
     *,
     first: float,
     last: float | None,
+    lake: Lake | None = None,
     advance: Callable[[int, int], None] | None = None,
 ) -> Recording:
     """Computes what a recording of a lake shows, window by window, beside its log.
 
     Args:
         first, last: part of the film [s].
+        lake: that it is of.
         advance: called after each window with how many there are and 1.
 
     Raises:
@@ -206,6 +212,7 @@ def windows_of_recording(
         log=log.undo_lag(),
         sensor=wind.sensor,
         findings=findings,
+        circumstances=subject.circumstances(lake),
     )
 
 

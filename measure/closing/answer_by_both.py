@@ -10,6 +10,7 @@ from flagdata.answer.closed import Closed
 from measure.closing.joint_verdict import Joint
 from measure.report import verdict_cells as cells
 from measure.report.document import plain
+from measure.report.lead_sentences import say_strength
 from measure.report.verdict_answer import TONES, quantity_of
 from measure.report.verdict_sections import GLOSSARY_ANCHOR, glossary_section
 from measure.report.verdict_sentences import list_names, shorten_list
@@ -85,9 +86,10 @@ def spoken(joint: Joint) -> str:
             return f"Something was missing: {either}; markers and films do not decide which."
         case conclusion:
             part = " a part of" if conclusion is Conclusion.PARTLY else ""
-            return (
-                f"Something was missing: {list_names(names)} explains{part} what both show ({p})."
-            )
+            together = [one.together for one in joint.strengths if one.together is not None]
+            strength = say_strength("strength", together[0]) if len(together) == 1 else ""
+            explains = f"{list_names(names)} explains{part} what both show"
+            return f"Something was missing: {explains}{strength or f' ({p})'}."
 
 
 def _sections(joint: Joint, answers: Mapping[str, Closed]) -> list[Section]:

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from flagdata.answer import Array, Figure, Head, Section, Table, Tone
 from flagdata.answer.calibrated import Calibrated
 from flagdata.answer.charts import Chart, Colour
+from flagdata.answer.circumstances import list_circumstances
 from flagdata.answer.quantity import Quantity
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
@@ -37,7 +38,6 @@ def answer_of_calibration(
     calibration: Calibration,
     *,
     artifact: str | None = None,
-    recorded: Mapping[str, str] | None = None,
     others: Sequence[Section] = (),
     further: Mapping[str, Any] | None = None,
 ) -> Calibrated:
@@ -45,7 +45,6 @@ def answer_of_calibration(
 
     Args:
         artifact: its id in the lake; None where it is not to be there.
-        recorded: rows about the recordings beside those that a calibration has: their date.
         others: sections of what was made of the same recordings.
         further: JSON values of what was made of them.
     """
@@ -65,7 +64,7 @@ def answer_of_calibration(
         arrays=_arrays(calibration),
         head=Head(
             figures=_head_figures(calibration),
-            facts={**_facts(calibration), **(recorded or {})},
+            facts=_facts(calibration),
             limits=_limits(calibration),
             remarks=_remarks(calibration),
         ),
@@ -178,13 +177,13 @@ def _remarks(calibration: Calibration) -> list[str | Markup]:
 def _facts(calibration: Calibration) -> dict[str, str]:
     flag, options = calibration.options.flag, calibration.options
     winds = np.concatenate([one.observed.speed for one in calibration.recordings])
-    clocks = sorted({one.observed.log.clock for one in calibration.recordings})
     lags = {one.observed.log.distance for one in calibration.recordings}
     held = "at both ends of its hoist" if flag.attachment == "corners" else "along its hoist"
     facts = {
         "recordings": ", ".join(
             f"{one.observed.name} ({one.observed.duration:.0f} s)" for one in calibration.recordings
         ),
+        **list_circumstances([one.observed.circumstances for one in calibration.recordings]),
         "wind": f"{winds.min():.1f} to {winds.max():.1f} m/s, logged",
         "flag": f"{flag.length:g} m × {flag.height:g} m, held {held}",
         "camera": f"{options.azimuth.degrees} from the wind's direction, {options.distance:g} m "
@@ -192,9 +191,7 @@ def _facts(calibration: Calibration) -> dict[str, str]:
     }
     known = [lag for lag in lags if lag is not None]
     if known and max(known) > 0:
-        facts["anemometer"] = f"with a lag of {max(known):g} m of wind, undone"
-    if clocks[-1] > 0:
-        facts["clock"] = f"of film and log together known to {clocks[-1]:.2g} s"
+        facts["lag of the anemometer"] = f"{max(known):g} m of wind, undone"
     return facts
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding
 from flagdata.core.stated import Stated
@@ -62,6 +63,7 @@ class Part:
         source: identity of the film.
         first, end: of the part [s].
         findings: on its length.
+        circumstances: of the whole film.
     """
 
     film: ConditionedFilm
@@ -70,6 +72,7 @@ class Part:
     first: float
     end: float
     findings: tuple[Finding, ...] = ()
+    circumstances: Circumstances = field(default_factory=Circumstances)
 
     @classmethod
     def of(
@@ -80,6 +83,7 @@ class Part:
         source: str,
         first: float = 0.0,
         last: float | None = None,
+        circumstances: Circumstances | None = None,
     ) -> Part:
         """Chooses the part from `first` to `last` [s], `LONGEST` at most.
 
@@ -92,7 +96,15 @@ class Part:
             findings, end = (first_part(end - first),), first + LONGEST
         check_duration(end - first, where=film.name)
         log.cut(first, end)
-        return cls(film=film, log=log, source=source, first=first, end=end, findings=findings)
+        return cls(
+            film=film,
+            log=log,
+            source=source,
+            first=first,
+            end=end,
+            findings=findings,
+            circumstances=circumstances or Circumstances(),
+        )
 
     @property
     def duration(self) -> float:
@@ -137,6 +149,7 @@ class Part:
             sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]),
             findings=findings,
             excerpt=Excerpt.of(film_windows.windows),
+            circumstances=self.circumstances.part(first, self.duration),
         )
 
 
@@ -273,7 +286,7 @@ def open_recording(
             fix="give them with a table of observables",
         )
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
-    part = part_of(subject, first=first, last=last)
+    part = part_of(subject, first=first, last=last, lake=lake)
     return Opened(
         name=source, parent=None if subject.artifact is None else subject.artifact.id, part=part
     )
@@ -317,8 +330,13 @@ def _of_table(
     return recordings, parent
 
 
-def part_of(subject: Subject, *, first: float, last: float | None) -> Part:
+def part_of(
+    subject: Subject, *, first: float, last: float | None, lake: Lake | None = None
+) -> Part:
     """Returns the part of a film whose recording holds a log, from `first` to `last` [s].
+
+    Args:
+        lake: that it is of; None where the film is of no lake.
 
     Raises:
         InputError: no log beside it, or one that does not cover the film; too short a part.
@@ -332,7 +350,8 @@ def part_of(subject: Subject, *, first: float, last: float | None) -> Part:
         )
     clock = None if subject.artifact is None else subject.artifact.clock_sigma
     log = Log.of(wind, start=film.start, clock=clock or 0.0)
-    return Part.of(film, log, source=subject.identity, first=first, last=last)
+    stated = subject.circumstances(lake)
+    return Part.of(film, log, source=subject.identity, first=first, last=last, circumstances=stated)
 
 
 _DESCRIPTIONS = (".toml", ".json")

@@ -27,6 +27,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.rng import stream
@@ -188,6 +189,7 @@ class Observed:
             are one; None for a recording of a place of its own.
         findings: what was noticed.
         excerpt: some of its film; None where there is no film.
+        circumstances: when, where and with what it was recorded.
 
     Raises:
         InputError: shapes that disagree, or too few windows.
@@ -203,6 +205,7 @@ class Observed:
     sigma: FloatArray = field(default_factory=lambda: np.zeros(len(OBSERVED)))
     findings: tuple[Finding, ...] = ()
     excerpt: Excerpt | None = None
+    circumstances: Circumstances = field(default_factory=Circumstances)
 
     def __post_init__(self) -> None:
         count = len(OBSERVED)

@@ -24,6 +24,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.core.arrays import FloatArray
 from flagdata.core.clock_model import ClockModel
 from flagdata.core.files.bounded_parquet import read_parquet
@@ -425,6 +426,7 @@ def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside 
                 fix="fill the column in, or give a log beside the table",
             )
         log = Log(times=times[finite] - begin, speed=table[WIND][finite], averaging=step)
+        stated = Circumstances()
     else:
         start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
         common, sigma = (
@@ -432,6 +434,8 @@ def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside 
             float(wind_log.clock.sigma(start)[0]),
         )
         log = Log.of(wind_log.series, start=common, clock=sigma)
+        seconds, sensor = WINDOW * (len(edges) - 1), wind_log.series.sensor.words
+        stated = Circumstances(start=common, seconds=seconds, sensor=sensor, clock=sigma)
         identity = (
             f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
         )
@@ -450,6 +454,7 @@ def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside 
         readings=readings,
         log=log,
         findings=_of_rows(table, step),
+        circumstances=stated,
         sigma=np.array([_mean(table.of(f"{observable}{SIGMA}")) for observable in OBSERVED]),
     )
 

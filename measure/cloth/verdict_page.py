@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from flagdata.answer.answer import Cell, Figure, Section, Table
 from flagdata.answer.charts import Chart, Colour
+from flagdata.answer.circumstances import list_circumstances
 from flagdata.answer.closed import Closed
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import child_seed, stream
@@ -262,12 +263,15 @@ def _facts(outcome: SolvedLoop) -> dict[str, str]:
     weight = options.area_weight
     return {
         "recordings": list_names(shorten_list(winds)),
+        **list_circumstances([one.circumstances for one in recordings]),
         "windows": ", ".join(str(len(one.readings)) for one in recordings[:_FEW])
         + f", of {WINDOW:g} s each",
         "flag": f"{flag.length:g} m × {flag.height:g} m, {flag.attachment}",
-        "area weight": "not weighed"
-        if weight is None
-        else f"{weight.middle:.3g} ± {deviation_of(weight):.1g} kg/m²",
+        **(
+            {}
+            if weight is None
+            else {"area weight": f"{weight.middle:.3g} ± {deviation_of(weight):.1g} kg/m²"}
+        ),
     }
 
 

@@ -3,7 +3,7 @@ prints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,6 @@ from flagdata.core.printable import SHORT
 from flagdata.core.shell import command_line
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
-from flagdata.timebase import iso
 from flagdata.verbs.verb_options import described_fields, typed_names
 
 if TYPE_CHECKING:
@@ -275,7 +274,6 @@ def _answer_weight(
     return answer_of_calibration(
         weighing.calibration,
         artifact=wanted,
-        recorded=_dates(lake, weighing.parents, at=chosen.version),
         others=_sections(anemometer),
         further={
             "artifact": wanted,
@@ -339,12 +337,3 @@ def _sections(anemometer: Made | None) -> tuple[Section, ...]:
     from measure.anemometer.reading_answer import reading_section
 
     return (reading_section(anemometer.result),)
-
-
-def _dates(lake: Lake | None, parents: Sequence[str], *, at: str) -> Mapping[str, str]:
-    """Returns when the recordings of a lake were made."""
-    if lake is None:
-        return {}
-    starts = [lake.artifact(parent, at=at).start for parent in parents]
-    dates = [f"{iso(start)[:16].replace('T', ' ')} UTC" for start in starts if start is not None]
-    return {"recorded": ", ".join(dates)} if dates else {}

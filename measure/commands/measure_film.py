@@ -199,7 +199,7 @@ def answer_of(
             subject,
             anyway=anyway,
             rate=rate,
-            zone_name=_zone_name(lake, subject),
+            circumstances=subject.circumstances(lake),
             elsewhere=elsewhere,
         ),
         make_sections=lambda: make_sections(
@@ -319,19 +319,6 @@ def _provenance(
         "seed": str(request.options.seed),
     }
     return rows if artifact is None else {**rows, "artifact": artifact}
-
-
-def _zone_name(lake: Lake | None, subject: Subject) -> str | None:
-    """Finds the zone in which a recording's camera or log was ingested; None where none was
-    given."""
-    if lake is None or subject.artifact is None or subject.recording is None:
-        return None
-    for parent in lake.artifact(subject.recording).parents:
-        recipe = lake.artifact(parent).recipe
-        for part in ("camera", "wind"):
-            if name := recipe.get(part, {}).get("zone"):
-                return str(name)
-    return None
 
 
 def wind_elsewhere(measurement: Measurement, chosen: Measuring) -> WindComparison | None:

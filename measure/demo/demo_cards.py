@@ -120,12 +120,12 @@ def _sentence(truths: Sequence[Truth]) -> str:
     judged = [one for one in truths if one.judgement not in (Judgement.OPEN, Judgement.GIVEN)]
     right = sum(truth.judgement is Judgement.RIGHT for truth in judged)
     if not judged:
-        return "What no file states was sought, and stands beside the truth"
+        return "What no file states was sought, and stands beside the truth."
     if len(judged) == 1:
         (one,) = judged
-        return f"What no file states was {'found' if right else 'not found'}: the {one.what}"
+        return f"What no file states was {'found' if right else 'not found'}: the {one.what}."
     verb = "was" if right == 1 else "were"
-    return f"Of {len(judged)} things that no file states {right or 'none'} {verb} found"
+    return f"Of {len(judged)} things that no file states {right or 'none'} {verb} found."
 
 
 def _tone(truths: Sequence[Truth]) -> Tone:

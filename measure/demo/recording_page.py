@@ -99,7 +99,7 @@ def _sentence(clock: Recovered) -> str:
     return (
         f"The log's clock is {abs(clock.offset):.1f} s {side} the camera's; the 90 % interval "
         f"{holds} "
-        "the truth, which is in neither file"
+        "the truth, which is in neither file."
     )
 
 

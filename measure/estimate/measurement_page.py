@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
+from dataclasses import replace
 
 from flagdata.answer import Figure, Gallery, Head, Quantity, Section, Table
 from flagdata.answer.answer import Part
+from flagdata.answer.circumstances import Circumstances, list_circumstances
 from flagdata.answer.wind_elsewhere import WindComparison
 from flagdata.core.findings import Finding, Severity
-from flagdata.lake import Artifact
 from flagdata.pages.page_pictures import moving
-from flagdata.timebase import NANOSECONDS, zone
 from measure.estimate import measurement_charts
 from measure.estimate.film_answer import FORMS, HEADLINE, SHORT, form_of
 from measure.estimate.film_measuring import Measurement
@@ -32,7 +31,7 @@ def make_head(
     *,
     anyway: bool,
     rate: float,
-    zone_name: str | None = None,
+    circumstances: Circumstances | None = None,
     elsewhere: WindComparison | None = None,
 ) -> Head:
     """Makes the first screen: the film, its winds beside the anemometer's, and the facts about
@@ -42,10 +41,11 @@ def make_head(
         anyway: whether estimates are shown although the gate refused the film. Where there is
             nothing to measure, none are.
         rate: of the network's frames [Hz].
-        zone_name: of the clocks at the place; None where nobody said.
+        circumstances: when, where and with what it was recorded; None for those of the film alone.
         elsewhere: the comparison with a wind from elsewhere; None where none was stated.
     """
     shown, film = measured.shown(anyway=anyway), subject.film
+    stated = circumstances or subject.circumstances(None)
     spacing = measured.windows[0].end - measured.windows[0].start
     clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else rate
     figures = [
@@ -59,7 +59,7 @@ def make_head(
     if shown and (len(series.time) > 1 or series.logged is not None):
         logged = None if subject.record is None else subject.record.wind_1hz()
         chart = measurement_charts.winds(
-            measured, series, start=film.start, logged=logged, zone_name=zone_name
+            measured, series, start=film.start, logged=logged, zone_name=stated.zone
         )
         figures.append(
             Figure(
@@ -73,13 +73,11 @@ def make_head(
         figures.append(picture)
     compared = {} if elsewhere is None else {"wind elsewhere": _sentence(elsewhere.sentence)}
     facts = {
-        "date and time": _time(film.start, measured.duration, zone_name),
-        **_place(subject.artifact),
+        **list_circumstances([replace(stated, seconds=measured.duration)]),
         "film": f"{measured.duration:.3g} s at {measured.rate:.4g} frames a second",
         "size of the flag": _size(measured),
         **(_cloth(measured) if shown else {}),
         **({} if measured.gusts is None or not shown else {"gusts": measured.gusts.words}),
-        "anemometer": _sensor(subject),
         "like the training": _windows(measured),
         **compared,
         **_simulated(subject.known or {}),
@@ -149,34 +147,11 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
-def _time(start: int | None, duration: float, zone_name: str | None) -> str:
-    if start is None:
-        return "not known; times count from the first frame"
-    end = start + round(duration * NANOSECONDS)
-    known = UTC if zone_name is None else zone(zone_name)
-    first, last = (datetime.fromtimestamp(one / NANOSECONDS, known) for one in (start, end))
-    clock = "UTC" if zone_name is None else f"local time ({zone_name})"
-    return f"{first.day} {first:%B %Y}, {first:%H:%M:%S} to {last:%H:%M:%S}, {clock}"
-
-
-def _place(artifact: Artifact | None) -> dict[str, str]:
-    """Returns place and clock of a recording, as far as its row in the lake states them."""
-    if artifact is None:
-        return {}
-    rows = {} if artifact.session is None else {"session": artifact.session}
-    if artifact.clock_sigma is not None:
-        rows["clock"] = (
-            f"film and anemometer on one clock to ± {artifact.clock_sigma:.2g} s (1 σ), by "
-            f"{artifact.clock_method or 'alignment'}"
-        )
-    return rows
-
-
 def _size(measured: Measurement) -> str:
     size = measured.options.size
     if size is not None:
         return f"{size.length:g} m × {size.height:g} m, as given"
-    return "not given; several are considered"
+    return "several are considered, as none was given"
 
 
 def _cloth(measured: Measurement) -> dict[str, str]:
@@ -196,14 +171,6 @@ def _words(quantity: Quantity) -> str:
     low, high = map(form.number, quantity.assumed or quantity.interval)
     ends = (low if low == high else f"{low} to {high}") + form.suffix
     return f"{ends}, as given" if quantity.given else f"not constrained by this film ({ends})"
-
-
-def _sensor(subject: Subject) -> str:
-    wind = None if subject.record is None else subject.record.wind()
-    if wind is None:
-        return "none beside the film"
-    height = "" if wind.sensor.height is None else f", {wind.sensor.height:g} m above ground"
-    return f"{wind.sensor.name}{height}"
 
 
 def _windows(measured: Measurement) -> str:

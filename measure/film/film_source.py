@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.core.provenance import file_hash
 from flagdata.core.schema import Kind
 from flagdata.errors import NotFoundError, UsageError
@@ -110,6 +111,36 @@ class Subject:
     def identity(self) -> str:
         """Id of the artifact, or the content hash of a plain file."""
         return str(self.content_hash()) if self.artifact is None else self.artifact.id
+
+    def circumstances(self, lake: Lake | None) -> Circumstances:
+        """Returns when, where and with what it was recorded.
+
+        Args:
+            lake: of its artifact, whose parents state the zone of their clocks; None for none.
+        """
+        wind = None if self.record is None else self.record.wind()
+        row = self.artifact
+        return Circumstances(
+            start=self.film.start,
+            seconds=self.film.duration,
+            zone=None if lake is None else self._zone_name(lake),
+            session=None if row is None else row.session,
+            sensor="" if wind is None else wind.sensor.words,
+            clock=None if row is None else row.clock_sigma,
+            clock_method=None if row is None else row.clock_method,
+        )
+
+    def _zone_name(self, lake: Lake) -> str | None:
+        """Finds the zone in which a recording's camera or log was ingested; None where none was
+        given."""
+        if self.recording is None:
+            return None
+        for parent in lake.artifact(self.recording).parents:
+            recipe = lake.artifact(parent).recipe
+            for part in ("camera", "wind"):
+                if name := recipe.get(part, {}).get("zone"):
+                    return str(name)
+        return None
 
     def content_hash(self) -> str | None:
         """Hashes a plain file, or the names and hashes of a folder's files (SHA-256); None of an

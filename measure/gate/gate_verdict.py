@@ -227,8 +227,8 @@ class Verdict:
             kind = self.faults[0].kind
             return UNCALIBRATED[kind] if kind in UNCALIBRATED else REASONS[kind].brief
         if self.unlike:
-            return "it is not like the films that the network was trained on"
-        return "it depends on the size of the flag, which was not given"
+            return "the film is unlike those that the network was trained on"
+        return "the answer depends on the size of the flag, which was not given"
 
     @property
     def sentence(self) -> str:

@@ -27,7 +27,7 @@ from measure.verdict.quantity import (
     probability,
     with_level,
 )
-from measure.verdict.verdict_record import Candidate, Conclusion, NullTest, Verdict
+from measure.verdict.verdict_record import Candidate, Conclusion, Estimate, NullTest, Verdict
 
 _EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
 """Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology &
@@ -109,18 +109,18 @@ def _spoken_strength(verdict: Verdict) -> str:
     """Writes the strength of the one that is named, as a person says it; empty where several are,
     or it is not known."""
     named = named_candidates(verdict)
-    if (
-        len(verdict.named) != 1
-        or len(named) != 1
-        or not known(named[0].strength)
-        or named[0].strength.bound == "nothing"
-    ):
+    if len(verdict.named) != 1 or len(named) != 1:
         return ""
-    (candidate,) = named
-    value, ends = estimate_parts(candidate.strength)
+    return say_strength(readable(named[0].parameter), named[0].strength)
+
+
+def say_strength(name: str, strength: Estimate) -> str:
+    """Writes "; its coefficient is 0.62 (0.54 to 0.70, 90 %)"; empty where it is not known."""
+    if not known(strength) or strength.bound == "nothing":
+        return ""
+    value, ends = estimate_parts(strength)
     interval = f"{ends.strip('[]').replace(', ', ' to ')}, " if ends else ""
-    level = level_text(candidate.strength.level)
-    return f"; its {readable(candidate.parameter)} is {value} ({interval}{level})"
+    return f"; its {name} is {value} ({interval}{level_text(strength.level)})"
 
 
 def _add_remainder(sentence: str, verdict: Verdict) -> str:

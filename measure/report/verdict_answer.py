@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from flagdata.answer import Bound, Quantity, Span
 from flagdata.answer.answer import Cell, Figure, Head, Part, Section, Table, Tone
+from flagdata.answer.circumstances import Circumstances, list_circumstances
 from flagdata.answer.closed import Closed
 from measure.report import verdict_cells as cells
 from measure.report import verdict_sections as sections
@@ -56,9 +57,10 @@ def answer_of_markers(
         experiment: whose cloth, wind and tracks are shown beside; None where a verdict is all
             that is known.
     """
+    names = [residual.recording for residual in verdict.residuals]
     return closed(
         verdict,
-        subject=subject or list_names(shorten_list([r.recording for r in verdict.residuals])),
+        subject=subject or (list_names(shorten_list(names)) if names else "recordings"),
         words=words(verdict),
         figures=_head_figures(verdict),
         facts={
@@ -218,7 +220,19 @@ def _facts_of(experiment: Experiment) -> dict[str, str]:
     gains, directions, clocks = zip(
         *(recording.wind.uncertainty for recording in experiment.recordings), strict=True
     )
+    winds = list_circumstances(
+        [
+            Circumstances(
+                start=one.wind.start,
+                seconds=len(one.positions) / one.rate,
+                session=one.session,
+                sensor=one.wind.sensor,
+            )
+            for one in experiment.recordings
+        ]
+    )
     return {
+        **winds,
         "cloth": f"{cloth}{known}; held at {len(specimen.held)} points",
         "wind's log": f"known to {number(100 * max(gains), digits=2)} % in speed, "
         f"{number(math.degrees(max(directions)), digits=2)}° in direction and "

@@ -453,6 +453,7 @@ def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
         noise=_noise(observation),
         source=observation.source,
         seen=observation.seen,
+        session=observation.session,
     )
 
 

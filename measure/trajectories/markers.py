@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,8 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) ->
             fix="name a marker artifact; flagdata ls lists them",
         )
     sequence = read_markers(lake.whole_object(artifact.object))  # damage must not be measured
-    return _observation(sequence, name=name or artifact.name, source=artifact.id)
+    observation = _observation(sequence, name=name or artifact.name, source=artifact.id)
+    return replace(observation, session=artifact.session)
 
 
 def _observation(sequence: MarkerSequence, *, name: str, source: str = "") -> Observation:

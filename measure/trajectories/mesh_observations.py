@@ -123,7 +123,8 @@ def from_artifact(
     description = (
         observation.known if observation.known.pins is not None else of_simulation(artifact, first)
     )
-    return replace(observation, source=artifact.id, known=description)
+    described = replace(observation, source=artifact.id, known=description)
+    return replace(described, session=artifact.session)
 
 
 def from_sequence(

@@ -78,6 +78,7 @@ class Observation:
         findings: of reading it.
         seen: (frame, marker) whether each position was tracked, once gaps are filled; None where
             all were.
+        session: one set-up at one place; None where nobody stated one.
 
     Raises:
         InputError: shapes that disagree, or times that are not finite or do not increase.
@@ -94,6 +95,7 @@ class Observation:
     known: Known = field(default_factory=Known)
     findings: tuple[Finding, ...] = ()
     seen: BoolArray | None = None
+    session: str | None = None
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"

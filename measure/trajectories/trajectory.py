@@ -11,6 +11,7 @@ import numpy as np
 
 from flagdata.core.arrays import AnyArray, BoolArray, FloatArray
 from flagdata.errors import InputError
+from flagdata.timebase import NANOSECONDS
 from sim.cloth.air import AirForce, QuadraticNormal
 from sim.cloth.handles import ARCSIM_STIFFNESS
 from sim.cloth.material import Material
@@ -40,6 +41,9 @@ class WindTrack:
         gain: standard deviation of the share by which the wind is stronger than logged.
         direction: the same of the angle by which it is turned about the vertical [rad].
         clock: the same of the time by which the log lags behind the recording [s].
+        start: instant of the recording's first frame on the log's clock [UTC ns]; None where no
+            log states it.
+        sensor: what logged it, in words; empty where that is not known.
 
     Raises:
         InputError: shapes that disagree, values that are not finite, times that do not increase, a
@@ -51,6 +55,8 @@ class WindTrack:
     gain: float = GAIN
     direction: float = DIRECTION
     clock: float = CLOCK
+    start: int | None = None
+    sensor: str = ""
 
     def __post_init__(self) -> None:
         times, velocity = _frozen(self.times), _frozen(self.velocity)
@@ -100,7 +106,8 @@ class WindTrack:
 
     def later(self, seconds: float) -> WindTrack:
         """Shifts the wind's times to an instant that many seconds later."""
-        return replace(self, times=self.times - seconds)
+        start = None if self.start is None else self.start + round(seconds * NANOSECONDS)
+        return replace(self, times=self.times - seconds, start=start)
 
     def between(self, begin: float, end: float) -> WindTrack:
         """Cuts the wind to the part from `begin` to `end` [s], or as much of that as the log
@@ -186,6 +193,7 @@ class Trajectory:
             all were. What is filled starts a prediction, and is never compared with one.
         attachments: (frame, held, 3) where the cloth is held, if that moves [m]; None where it is
             held still.
+        session: one set-up at one place; None where nobody stated one.
 
     Raises:
         InputError: shapes that disagree, a rate or noise that makes no sense, infinite positions.
@@ -200,6 +208,7 @@ class Trajectory:
     source: str = ""
     seen: BoolArray | None = None
     attachments: FloatArray | None = None
+    session: str | None = None
 
     def __post_init__(self) -> None:
         markers, positions = _frozen(self.markers), _frozen(self.positions)

@@ -124,7 +124,8 @@ def track(
                 where=f"{where}, {times[int(np.diff(times).argmax())]:.4g} s after the first frame",
             )
         )
-    return WindTrack(times=times, velocity=velocity[good]), tuple(findings)
+    wind = WindTrack(times=times, velocity=velocity[good], start=begin, sensor=series.sensor.words)
+    return wind, tuple(findings)
 
 
 def from_log(

@@ -219,7 +219,7 @@ def test_the_first_page_says_how_much_of_what_no_file_states_was_found() -> None
         card("wind", Judgement.RIGHT),
     ]
     answer = demonstration_answer(cards, seconds=125)
-    assert answer.sentence == "Of 3 things that no file states 2 were found"
+    assert answer.sentence == "Of 3 things that no file states 2 were found."
     assert (answer.tone, list(answer.head.limits)) == (
         Tone.MISSED,
         ["Log missed: what was found does not hold the truth."],

@@ -168,7 +168,7 @@ def test_a_refused_film_is_shown_without_estimates_unless_asked_for_and_then_mar
     refused = replace(found, verdict=replace(found.verdict, p=0.001))
     answer = answered(refused, model)
     said = words(answer.page)
-    assert answer.sentence.startswith("Refused: it is not like the films")
+    assert answer.sentence.startswith("Refused: the film is unlike those")
     assert "All quantities" not in said
     assert "m/s" not in said
     for reason in answer.reasons:

@@ -114,3 +114,11 @@ def test_a_vendors_file_is_read_as_ingest_reads_it(tmp_path: Path):
     )  # it blows from west all the time, and ever faster
     wind, _ = from_log(path, LogPlacement(north=NORTH_IS_Y, start=BEGIN + 2_000_000_000), answers)
     np.testing.assert_allclose(wind.at(np.array([0.0])), [[4.2, 0, 0]], atol=1e-9)
+
+
+def test_a_track_states_when_the_recording_began_and_what_logged_it() -> None:
+    log = series(wind_speed=[5.0] * 5)
+    wind, _ = track(log, LogPlacement(axis=(1.0, 0.0, 0.0), offset=1.5), where="log")
+    assert (wind.start, wind.sensor) == (BEGIN + 1_500_000_000, "test")
+    assert wind.later(2.0).start == BEGIN + 3_500_000_000
+    assert WindTrack.constant((5.0, 0.0, 0.0)).later(2.0).start is None
