@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.answer.circumstances import Circumstances
 from flagdata.api.measuring_verbs import OfFlag
 from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError, RefusedError
@@ -36,6 +37,7 @@ def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> An
         artifact=artifact,
         record=SimpleNamespace(wind=lambda: wind),
         identity="0123abcd",
+        circumstances=lambda lake: Circumstances(start=_START, seconds=300.0, sensor="cup"),
     )
 
 
@@ -57,6 +59,8 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("shown")
 def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
     found = filmed.part_of(_subject(), first=10.0, last=None).read(_SIZE)
+    stated = found.circumstances
+    assert (stated.start, stated.seconds, stated.sensor) == (_START + 10 * 10**9, 120.0, "cup")
     assert found.readings.shape == (48, len(OBSERVED))
     assert np.isnan(found.readings[2]).all()
     assert found.readings[5, 0] == 5.0
