@@ -144,7 +144,7 @@ def _facts(result: ReadingCalibration) -> dict[str, str]:
         **list_circumstances([one.circumstances for one in result.recordings]),
         "windows": f"{result.windows} of {model.step:.2g} s",
         "flag": f"{size.length:g} m × {size.height:g} m",
-        "clock": _clock(result),
+        **({"clock": _clock(result)} if result.clock_sigma else {}),
     }
 
 

@@ -14,6 +14,7 @@ from measure.report.lead_sentences import say_strength
 from measure.report.verdict_answer import TONES, quantity_of
 from measure.report.verdict_sections import GLOSSARY_ANCHOR, glossary_section
 from measure.report.verdict_sentences import list_names, shorten_list
+from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import probability
 from measure.verdict.verdict_record import Conclusion
 
@@ -31,7 +32,7 @@ def joint_answer(joint: Joint, by_markers: Closed, by_films: Closed) -> Closed:
     figures = [figure for answer in answers.values() for figure in answer.head.figures[:1]]
     return Closed(
         question="close-loop",
-        subject=f"{by_markers.subject} and {by_films.subject}",
+        subject=" and ".join(dict.fromkeys([by_markers.subject, by_films.subject])),
         sentence=spoken(joint),
         tone=TONES[joint.conclusion],
         quantities=strengths,
@@ -42,11 +43,7 @@ def joint_answer(joint: Joint, by_markers: Closed, by_films: Closed) -> Closed:
         },
         head=Head(
             figures=figures,
-            facts={
-                f"{kind}: {name}": fact
-                for kind, answer in answers.items()
-                for name, fact in answer.head.facts.items()
-            },
+            facts=_join_facts({kind: answer.head.facts for kind, answer in answers.items()}),
             limits=[
                 f"{kind.capitalize()}: {limit}"
                 for kind, answer in answers.items()
@@ -68,6 +65,17 @@ def joint_answer(joint: Joint, by_markers: Closed, by_films: Closed) -> Closed:
     )
 
 
+def _join_facts(facts: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Joins the facts of each kind: one row a name, with its kind where not all state the same."""
+    joined: dict[str, str] = {}
+    for name in dict.fromkeys(name for stated in facts.values() for name in stated):
+        lines = {kind: stated[name] for kind, stated in facts.items() if name in stated}
+        agreed = len(lines) == len(facts) and len(set(lines.values())) == 1
+        several = "; ".join(f"{kind}: {line}" for kind, line in lines.items())
+        joined[name] = next(iter(lines.values())) if agreed else several
+    return joined
+
+
 def spoken(joint: Joint) -> str:
     """Writes the answer in a sentence of fewer than 25 words that can be said aloud."""
     p = f"p = {probability(joint.p_value)}"
@@ -86,8 +94,12 @@ def spoken(joint: Joint) -> str:
             return f"Something was missing: {either}; markers and films do not decide which."
         case conclusion:
             part = " a part of" if conclusion is Conclusion.PARTLY else ""
-            together = [one.together for one in joint.strengths if one.together is not None]
-            strength = say_strength("strength", together[0]) if len(together) == 1 else ""
+            agreed = [
+                one.together
+                for one in joint.strengths
+                if one.together is not None and (one.apart or 0.0) <= CRITERIA.lead
+            ]
+            strength = say_strength("strength", agreed[0]) if len(agreed) == 1 else ""
             explains = f"{list_names(names)} explains{part} what both show"
             return f"Something was missing: {explains}{strength or f' ({p})'}."
 

@@ -175,17 +175,16 @@ def _remarks(calibration: Calibration) -> list[str | Markup]:
 
 
 def _facts(calibration: Calibration) -> dict[str, str]:
-    flag, options = calibration.options.flag, calibration.options
+    options = calibration.options
     winds = np.concatenate([one.observed.speed for one in calibration.recordings])
     lags = {one.observed.log.distance for one in calibration.recordings}
-    held = "at both ends of its hoist" if flag.attachment == "corners" else "along its hoist"
     facts = {
         "recordings": ", ".join(
             f"{one.observed.name} ({one.observed.duration:.0f} s)" for one in calibration.recordings
         ),
         **list_circumstances([one.observed.circumstances for one in calibration.recordings]),
         "wind": f"{winds.min():.1f} to {winds.max():.1f} m/s, logged",
-        "flag": f"{flag.length:g} m × {flag.height:g} m, held {held}",
+        "flag": options.flag.words,
         "camera": f"{options.azimuth.degrees} from the wind's direction, {options.distance:g} m "
         "away",
     }

@@ -157,6 +157,12 @@ class Flag:
     height: float
     attachment: str = "corners"
 
+    @property
+    def words(self) -> str:
+        """Its size, and how it is held."""
+        held_at = "at both ends of its hoist" if self.attachment == "corners" else "along its hoist"
+        return f"{self.length:g} m × {self.height:g} m, held {held_at}"
+
     def mesh(self, columns: int) -> Mesh:
         """Makes a regular mesh of it."""
         rows = max(2, round(columns * self.height / self.length))

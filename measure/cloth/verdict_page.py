@@ -259,14 +259,13 @@ def _facts(outcome: SolvedLoop) -> dict[str, str]:
     """Returns what the first screen says of the recordings."""
     recordings, options = outcome.recordings, outcome.options
     winds = [f"{one.name} ({one.speed.mean():.1f} m/s)" for one in recordings]
-    flag = options.calibration.flag
     weight = options.area_weight
     return {
         "recordings": list_names(shorten_list(winds)),
         **list_circumstances([one.circumstances for one in recordings]),
         "windows": ", ".join(str(len(one.readings)) for one in recordings[:_FEW])
         + f", of {WINDOW:g} s each",
-        "flag": f"{flag.length:g} m × {flag.height:g} m, {flag.attachment}",
+        "flag": options.calibration.flag.words,
         **(
             {}
             if weight is None

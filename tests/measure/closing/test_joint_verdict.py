@@ -189,3 +189,20 @@ def test_a_joint_answer_can_be_said_aloud(conclusion: Conclusion) -> None:
     said = spoken(replace(found, conclusion=conclusion, named=named.get(conclusion, found.named)))
     assert len(said.split()) < 25
     assert said.endswith(".")
+
+
+def test_the_first_screen_says_once_what_both_kinds_state_and_how_strong_the_effect_is() -> None:
+    found = both(judged(Conclusion.EFFECT, 0.02), judged(Conclusion.EFFECT, 0.02))
+    answer = answer_of(found)
+    assert answer.sentence == (
+        "Something was missing: lift explains what both show; its strength is 0.6 "
+        "(0.3 to 1.4, 90 %)."
+    )
+    assert not any(name.startswith(("markers", "films")) for name in answer.head.facts)
+    (share,) = (fact for name, fact in answer.head.facts.items() if name == "with lift")
+    assert share.count("explains") == 1
+    weaker = both(judged(Conclusion.EFFECT, 0.02), judged(Conclusion.EFFECT, 0.01))
+    evidence = answer_of(weaker).head.facts["evidence"]
+    assert evidence.startswith("markers: moderate evidence")
+    assert "; films: strong evidence" in evidence
+    assert answer.subject == "recordings"
