@@ -23,7 +23,7 @@ FILES`."""
 RENAMED = {r"((?:cloth|place)\.\w+)\.determined$": r"\1.constrained"}
 """Pattern of a path in a kept document → its path today. Items of a list are numbered:
 `windows.0.wind`."""
-NEW = (r"(?:cloth|place)\.\w+\.given$",)
+NEW = (r"(?:cloth|place)\.\w+\.given$", r"\b(?:unweighed|copied)(?:\.|$)")
 """Patterns of paths that kept documents lack."""
 _OF_A_RUN = {"seconds", "code", "code_version", "created", "version", "milliseconds"}
 """Keys of what another run has otherwise."""

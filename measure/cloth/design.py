@@ -44,6 +44,7 @@ from measure.cloth.flag_prior import (
 )
 from measure.cloth.flag_simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
 from measure.cloth.observed_recording import Observed, check_in_all
+from measure.forecasting.recorded import STATED_WEIGHT
 from measure.forecasting.strengths import Strengths, on_films
 from measure.observables.observable import WINDOW
 from sim.effects.weighing import Need
@@ -69,7 +70,7 @@ class Weighable(Strengths):
 
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
     """Returns the effects that are weighed for a flag: those that need nothing else."""
-    has = filmed(flag)
+    has = filmed(flag, None)
     return tuple(
         Weighable(column=strength.column, low=strength.low, high=strength.high)
         for strength in on_films()
@@ -77,10 +78,19 @@ def weighable(flag: Flag) -> tuple[Weighable, ...]:
     )
 
 
-def filmed(flag: Flag) -> frozenset[Need]:
-    """Lists what films of a flag beside a log have of that which effects need."""
+def filmed(flag: Flag, area_weight: tuple[float, float] | None) -> frozenset[Need]:
+    """Lists what films of a flag beside a log have of that which effects need: the picture shows
+    where it is attached, and how the pole leans.
+
+    Args:
+        area_weight: as stated, with its standard deviation [kg/m²]; None where it is not.
+    """
     has = {Need.FILMS, Need.STILL, Need.TURBULENCE, Need.ANCHORS}
-    return frozenset(has | ({Need.FREE_HOIST} if flag.attachment == "corners" else set()))
+    if flag.attachment == "corners":
+        has.add(Need.FREE_HOIST)
+    if area_weight is not None and area_weight[1] <= STATED_WEIGHT * area_weight[0]:
+        has.add(Need.AREA_WEIGHT)
+    return frozenset(has)
 
 
 FAR = 15.0

@@ -197,6 +197,7 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
         yield "missing", verdict.proposal
     for assumption in verdict.assumptions:
         yield "assumed", assumption
+    yield from verdict_sentences.unseen_effects(verdict)
     yield from verdict.findings
 
 

@@ -19,7 +19,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
 from flagdata.core.json_values import json_values
 from flagdata.core.provenance import code_version
-from measure.cloth.design import Weighable
+from measure.cloth.design import Weighable, filmed
 from measure.cloth.films_statement import state_verdict
 from measure.cloth.flag_prior import CLOTH
 from measure.cloth.loop import (
@@ -38,6 +38,7 @@ from measure.cloth.observed_recording import Observed
 from measure.cloth.simulations import of_recordings
 from measure.cloth.unseen_windows import compare_models
 from measure.forecasting.setting import Stage
+from measure.forecasting.strengths import what_copies, why_unweighed
 from measure.posterior_ends import span
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
@@ -77,6 +78,7 @@ def close_loop(
 def verdict_of(outcome: SolvedLoop) -> Verdict:
     """Returns the verdict in numbers and sentences."""
     decision, options = outcome.judged, outcome.options
+    has = filmed(options.calibration.flag, options.area_weight)
     effects = outcome.weighing.effects
     names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
     acting = outcome.best if decision.named else None
@@ -108,6 +110,8 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
             "options": options.recipe(),
         },
         power=_power(outcome),
+        unweighed=tuple(why_unweighed(has).items()),
+        copied=tuple(what_copies(has).items()),
         open=decision.open,
         findings=tuple(
             (f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE

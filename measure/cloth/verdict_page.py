@@ -447,7 +447,8 @@ def _ranking(verdict: Verdict) -> Section:
         caption="Most probable first, in bold those that are named. Intervals at "
         f"{quantity.level_text(verdict.ranking[0].strength.level)}.",
     )
-    return Section(title="Effects", parts=[table, _HOW_RANKED], anchor="ranking", folded=True)
+    parts = [table, _HOW_RANKED, *sections.unseen_effects(verdict)]
+    return Section(title="Effects", parts=parts, anchor="ranking", folded=True)
 
 
 _HOW_RANKED = (

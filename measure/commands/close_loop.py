@@ -264,6 +264,12 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         out=out, lake=lake, branch=branch, as_json=chosen.as_json, verbose=chosen.verbose
     )
 
+    suspected = (
+        None
+        if chosen.suspect is None or (films and not two_kinds)
+        else Suspicion.parse(chosen.suspect, on_markers())
+    )
+
     def of_markers(level: float | None) -> tuple[ClosedLoop, Material]:
         """Returns the answer by markers, and the cloth's nominal material."""
         null_options = nulls_given(recipe, chosen, level=level)
@@ -273,9 +279,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
             most_nulls=chosen.most_nulls,
             workers=chosen.processes,
             scheduler=chosen.scheduler,
-            suspected=None
-            if chosen.suspect is None
-            else Suspicion.parse(chosen.suspect, on_markers()),
+            suspected=suspected,
             **null_options,
         )
         setup = _setup(Setup() if recipe is None else recipe.setup, chosen, joint=two_kinds)

@@ -10,7 +10,7 @@ from measure.trajectories.trajectory import Specimen, Trajectory
 from sim.cloth.handles import full_hoist
 from sim.effects.weighing import Need
 
-_WEIGHT = 0.05
+STATED_WEIGHT = 0.05
 """Relative standard uncertainty of an area weight that is stated to a few percent."""
 _DIRECTION = math.radians(2.0)
 
@@ -23,7 +23,7 @@ def recorded(specimen: Specimen, parts: Iterable[Trajectory | Segment]) -> froze
         Need.FREE_HOIST: bool({*full_hoist(specimen.mesh.rest)} - {*specimen.held}),
         Need.STILL: all(part.attachments is None for part in parts),
         Need.TURBULENCE: not all(part.wind.steady for part in parts),
-        Need.AREA_WEIGHT: uncertainty is not None and uncertainty <= _WEIGHT,
+        Need.AREA_WEIGHT: uncertainty is not None and uncertainty <= STATED_WEIGHT,
         Need.DIRECTION: all(part.wind.direction <= _DIRECTION for part in parts),
         Need.ANCHORS: specimen.anchors_given,
     }

@@ -99,6 +99,23 @@ def why_unweighed(recorded: Collection[Need]) -> dict[str, str]:
     return reasons
 
 
+def what_copies(recorded: Collection[Need]) -> dict[str, str]:
+    """Effect of the registry → what of the base model does the same as far as it is not stated, and
+    what would show the effect; nothing of effects that need what is not recorded.
+
+    Args:
+        recorded: what the recordings have, and what is stated of them.
+    """
+    return {
+        name: f"done as well by {copied.by}, as far as not stated; {copied.shown_by}, would show "
+        f"it ({copied.how})"
+        for name, effect in EFFECTS.usable()
+        if (copied := effect.copied) is not None
+        and copied.shown_by not in recorded
+        and set(effect.needs) <= set(recorded)
+    }
+
+
 @dataclass(frozen=True, kw_only=True)
 class Suspicion:
     """An effect that is suspected before recordings are looked at.

@@ -460,7 +460,10 @@ def _ranking(verdict: Verdict) -> Section:
         if chart is not None
     ]
     return Section(
-        title="Candidates", parts=[table, *figures, _HOW_RANKED], anchor="ranking", folded=True
+        title="Candidates",
+        parts=[table, *figures, _HOW_RANKED, *sections.unseen_effects(verdict)],
+        anchor="ranking",
+        folded=True,
     )
 
 

@@ -170,6 +170,14 @@ def closing_sections(verdict: Verdict) -> list[Section]:
     return [*sections, glossary_section()]
 
 
+def unseen_effects(verdict: Verdict) -> list[Part]:
+    """Makes the paragraphs on effects that the verdict says nothing of."""
+    return [
+        f"{label.capitalize()}: {text}."
+        for label, text in verdict_sentences.unseen_effects(verdict)
+    ]
+
+
 def glossary_section() -> Section:
     """Makes the section of what the terms mean."""
     terms = Markup("").join(

@@ -4,7 +4,7 @@ mean."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from measure.verdict.decided import NOT_REJECTED, erring, times_floor
 from measure.verdict.quantity import (
@@ -356,6 +356,14 @@ def candidate_title(verdict: Verdict, candidate: Candidate) -> str:
 def _begun(text: str) -> str:
     """As the beginning of a sentence."""
     return text[:1].upper() + text[1:]
+
+
+def unseen_effects(verdict: Verdict) -> Iterator[tuple[str, str]]:
+    """Lists what the verdict says nothing of: effects that were not weighed, and those that the
+    base model copies here (label, text)."""
+    for label, effects in (("not weighed", verdict.unweighed), ("hardly shown", verdict.copied)):
+        if effects:
+            yield label, "; ".join(f"{effect}: {why}" for effect, why in effects)
 
 
 def common_level(estimates: Iterable[Estimate]) -> str:

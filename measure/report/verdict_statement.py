@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.core.shell import command_line
+from measure.forecasting.recorded import recorded
 from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
+from measure.forecasting.strengths import what_copies, why_unweighed
 from measure.loop.corrective_field import Mode
 from measure.loop.run import LoopOutcome
 from measure.nulls import bank as banks
@@ -18,11 +20,11 @@ from measure.nulls.conformal import MOST_KINDS
 from measure.probes.lines import STROUHAL, SpectralLine
 from measure.probes.wind_course import ALONG, LEFT, Variation
 from measure.report.lead_sentences import lead
-from measure.report.verdict_sentences import list_names
 from measure.trajectories.trajectory import Experiment, Specimen
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number, with_error
 from measure.verdict.verdict_record import Conclusion, NullTest, Verdict
+from sim.effects.weighing import Need
 
 _SEPARATES: dict[frozenset[str], str] = {
     frozenset(
@@ -64,10 +66,11 @@ def with_sentences(outcome: LoopOutcome) -> Verdict:
         verdict,
         words=" ".join(parts),
         separating=separating(verdict),
+        unweighed=unweighed_effects(verdict, experiment),
+        copied=tuple(what_copies(_recorded(experiment)).items()),
         proposal=_lacking(outcome),
         assumptions=(
             *assumptions(experiment),
-            *unweighed_effects(verdict),
             *clocks(experiment, outcome.lags),
         ),
     )
@@ -142,16 +145,19 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
     )
 
 
-def unweighed_effects(verdict: Verdict) -> tuple[str, ...]:
-    """Lists which effects of the library a cloth cannot have as it is held; nothing where it can
-    have all."""
-    ranked = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
-    absent = [
-        column.effect for column in library() if (column.effect, column.parameter) not in ranked
-    ]
-    missing = list(dict.fromkeys(absent))
-    why = "not weighed, since the cloth cannot have it as it is held and in its wind"
-    return (f"{why}: {list_names(missing)}",) if missing else ()
+def unweighed_effects(verdict: Verdict, experiment: Experiment) -> tuple[tuple[str, str], ...]:
+    """Lists the effects that were not weighed, and why."""
+    ranked = {candidate.effect for candidate in verdict.ranking}
+    why = {column.effect: _NOT_HERE for column in library()}
+    why |= why_unweighed(_recorded(experiment))
+    return tuple((effect, reason) for effect, reason in why.items() if effect not in ranked)
+
+
+_NOT_HERE = "the cloth cannot have it as it is held and in its wind"
+
+
+def _recorded(experiment: Experiment) -> frozenset[Need]:
+    return recorded(experiment.specimen, experiment.recordings)
 
 
 def separating(verdict: Verdict) -> str:

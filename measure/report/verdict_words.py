@@ -80,6 +80,8 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
             yield item(label, text)
     for assumption in verdict.assumptions:
         yield item("assumed", assumption)
+    for label, text in verdict_sentences.unseen_effects(verdict):
+        yield item(label, text)
     for kind, text in verdict.findings:
         yield item(kind, text)
 

@@ -268,6 +268,9 @@ class Verdict:
         apart: half misfit of the wrong-effect control less that of what was named, a segment, over
             all recordings left out in turn [nat]; None where no control was run.
         findings: remarks on the data (kind, text).
+        unweighed: effects of the registry that were not weighed (effect, why).
+        copied: effects that parameters of the base model copy here (effect, which, and what would
+            show it).
         power: on films, of each effect that was weighed; empty on trajectories.
         open: why nothing was decided, where the base model is not rejected and not said to suffice;
             empty elsewhere.
@@ -288,6 +291,8 @@ class Verdict:
     proposal: str = ""
     apart: Estimate | None = None
     findings: tuple[tuple[str, str], ...] = ()
+    unweighed: tuple[tuple[str, str], ...] = ()
+    copied: tuple[tuple[str, str], ...] = ()
     power: tuple[Power, ...] = ()
     open: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)

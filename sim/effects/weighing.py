@@ -27,7 +27,7 @@ class Copied:
     """How the base model does what an effect does, by parameters of its own.
 
     Attributes:
-        by: the parameters, as in "the area weight".
+        by: the parameters, as in "the area weight": what they may be as long as they are fitted.
         shown_by: what has to be stated before the effect shows.
         how: that is measured.
     """

@@ -154,6 +154,7 @@ def test_the_page_says_the_verdicts_words_assumptions_and_remarks(
     ]
     sentences += [c.why_not for c in whole.ranking if c.effect not in whole.named]
     sentences += [part for finding in whole.findings for part in finding]
+    sentences += [part for effect in (*whole.unweighed, *whole.copied) for part in effect]
     for sentence in filter(None, sentences):
         assert sentence in text
 

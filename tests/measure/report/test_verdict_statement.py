@@ -14,6 +14,7 @@ from measure.report import by_draw, lead, with_sentences
 from measure.report.verdict_statement import assumptions, blowing, bounds, proposal, shedding
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion
+from sim.effects import EFFECTS
 from tests.measure.report.verdicts import verdict
 
 
@@ -137,8 +138,27 @@ def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its
     )
     assert "that fits the errors best" in said.proposal
     assert said.assumptions[-1].endswith("was moved: first by 0.50 s")
-    numbers = replace(said, words="", proposal="", separating="", assumptions=())
+    numbers = replace(
+        said, words="", proposal="", separating="", assumptions=(), unweighed=(), copied=()
+    )
     assert numbers == outcome.verdict
+
+
+def test_what_was_not_weighed_is_listed_with_its_reason_and_what_is_copied_with_what_would_show_it(
+    outcome: LoopOutcome,
+) -> None:
+    said = with_sentences(outcome)
+    unweighed = dict(said.unweighed)
+    assert unweighed["slack"].startswith("it needs films: ")
+    assert unweighed["internal-damping"] == "the cloth's damping is calibrated"
+    assert unweighed["lift"] == "the cloth cannot have it as it is held and in its wind"
+    assert set(unweighed) == set(EFFECTS)
+    told = replace(outcome.experiment.specimen, area_weight_uncertainty=0.03)
+    weighed = replace(outcome, experiment=replace(outcome.experiment, specimen=told))
+    assert {*dict(said.copied)} - {*dict(with_sentences(weighed).copied)} == {"wet-mass"}
+    assert "the cloth's area weight, stated to a few percent, would show it" in (
+        dict(said.copied)["wet-mass"]
+    )
 
 
 def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: LoopOutcome) -> None:

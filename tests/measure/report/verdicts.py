@@ -244,6 +244,8 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
                 "tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames.",
             ),
         ),
+        unweighed=(("slack", "it needs films: attachments lie farther out by it"),),
+        copied=(("wet-mass", "done as well by the area weight, as far as not stated"),),
         provenance={
             "seed": 17,
             "code": "0.1.0+abc1234",

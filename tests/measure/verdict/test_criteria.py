@@ -30,7 +30,7 @@ METHOD = {
     "forecasting/model": {"_SHARE"},
     "forecasting/observer": {"WIDEST", "_JOINT"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
-    "forecasting/strengths": {"_RANGES", "_SLACK"},
+    "forecasting/recorded": {"STATED_WEIGHT", "_DIRECTION"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
     "probes/wind_course": {"ALONG", "LEFT", "_WINDOW"},
     "probes/lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},

@@ -16,10 +16,12 @@ from flagdata.lake import Artifact, Lake
 from measure.cloth import OBSERVED, films_among, simulations_of
 from measure.commands.close_loop import close_loop
 from measure.forecasting import strengths
+from measure.forecasting.regressors import weighed_columns
 from measure.loop import LoopOptions
 from measure.observables import WINDOW
 from measure.trajectories import Experiment
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
+from sim.effects import Need
 from sim.run import load
 from tests.golden_answers import changes
 from tests.measure.cloth.loop.conftest import EFFECTS, recording
@@ -47,8 +49,8 @@ def run(*arguments: str | Path) -> Result:
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three effects are weighed."""
-    kept = {name: own for name, own in strengths._RANGES.items() if name in EFFECTS}
-    monkeypatch.setattr(strengths, "_RANGES", kept)
+    kept = [column for column in weighed_columns(Need.FILMS) if column.name in EFFECTS]
+    monkeypatch.setattr(strengths, "weighed_columns", lambda kind: kept)
 
 
 def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], few: None) -> None:
