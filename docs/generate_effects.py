@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from measure.report.effect_answer import answer_effect
 from sim.effects import EFFECTS, SENSOR_EFFECTS
+from sim.effects.description import describe
 from sim.effects.effect import (
     ClothEffect,
     Effect,
@@ -27,7 +27,8 @@ FOLDER = Path(__file__).with_name("effects")
 _HEAD = """\
 # Effects
 
-This page is generated from the library. An effect is something that the base model of [the simulator](simulator.md)
+This page is generated from the library; `flagdata catalog effects NAME` says the same of one effect, also of an installed
+package's, and with `--report FILE` draws where on a flag it acts. An effect is something that the base model of [the simulator](simulator.md)
 leaves out. Each has a *null value*, at which it is exactly absent; a *prior*, the range of values to be expected in the
 field; and the source of that range. A *strength* switches the effect on; a *shape* says how it looks once it is on.
 
@@ -116,10 +117,8 @@ def _members(family: Family) -> Shown:
 
 
 def _row(family: Family, name: str, effect: type[Parametrised]) -> str:
-    about = inspect.getdoc(sys.modules[effect.__module__]) or ""
-    first = _plain(about.split("\n\n")[0])
     link = f"[`{name}`](effects/{family.name}.md#{name})"
-    return f"| {family.title} | {link} | {first} |"
+    return f"| {family.title} | {link} | {_plain(describe(effect).about)} |"
 
 
 def _page(family: Family, effects: Shown) -> str:
@@ -131,15 +130,14 @@ def _page(family: Family, effects: Shown) -> str:
 
 
 def _section(name: str, effect: type[Parametrised]) -> str:
-    about = inspect.getdoc(sys.modules[effect.__module__]) or ""
-    equation, _, attributes = (inspect.getdoc(effect) or "").partition("\nAttributes:\n")
-    meanings = _meanings(attributes)
+    described = describe(effect)
     parameters = effect.parameters().items()
+    weighed = _weighed(name, effect) if issubclass(effect, Effect) else []
     return "\n".join(
         [
             f"## {name}\n",
-            f"{_plain(about.split(chr(10) * 2)[0])}\n",
-            f"{_plain(equation)}\n",
+            f"{_plain(described.about)}\n",
+            f"{_plain(described.equation)}\n",
             "| parameter | role | unit | prior | null value |",
             "|---|---|---|---|---|",
             *(
@@ -148,26 +146,27 @@ def _section(name: str, effect: type[Parametrised]) -> str:
             ),
             "",
             *(
-                f"- `{label}`: {_plain(meanings[label])} Prior: {_plain(e.source)}."
+                f"- `{label}`: {_plain(described.meanings[label])} Prior: {_plain(e.source)}."
                 for label, e in parameters
             ),
+            *(["", *weighed] if weighed else []),
             "",
         ]
     )
 
 
-def _meanings(attributes: str) -> dict[str, str]:
-    """Parameter → sentence, from the lines "a, b: what they are" of a docstring."""
-    found: dict[str, str] = {}
-    labels: list[str] = []
-    for line in inspect.cleandoc(attributes).splitlines():
-        if line and not line.startswith(" "):
-            names, _, text = line.partition(":")
-            labels = [label.strip() for label in names.split(",")]
-            found.update(dict.fromkeys(labels, text.strip()))
-        else:
-            found.update({label: f"{found[label]} {line.strip()}" for label in labels})
-    return found
+def _weighed(name: str, effect: type[Effect]) -> list[str]:
+    """How verdicts weigh it, as `flagdata catalog effects NAME` says it."""
+    answer = answer_effect(name)
+    strengths = [
+        f"`{label}` {' to '.join(f'{end:g}' for end in row['weighed'])}"
+        + (f" {row['unit']}" if row["unit"] != "1" else "")
+        for label, row in answer.document["parameters"].items()
+        if "weighed" in row and not effect.unweighed
+    ]
+    facts = [f"{fact}: {_plain(text)}" for fact, text in answer.head.facts.items()]
+    said = [*([f"strengths beyond null {', '.join(strengths)}"] if strengths else []), *facts]
+    return ["Closing the loop: " + "; ".join(said) + "."]
 
 
 def _range(entry: Parameter) -> str:

@@ -193,6 +193,8 @@ VERBS: dict[str, tuple[str, str]] = {
     verb: entry for _, verbs in GROUPS.values() for verb, entry in verbs.items()
 }
 
+# kind of name that has no recipe → what answers `flagdata catalog KIND NAME`
+ANSWERED: dict[str, str] = {"effects": "measure.report.effect_answer:answer_effect"}
 # what `flagdata catalog` lists → (where the names are, what takes one)
 NAMES: dict[str, tuple[str, str]] = {
     "scenes": ("sim.run.simulation_toml:SCENES", "simulate RECIPE"),

@@ -10,14 +10,16 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
+from flagdata.answer.answer import Answer, Table
 from flagdata.core.console import echo, echo_lines, say, table
 from flagdata.core.extras import explaining_missing
+from flagdata.core.files.outputs import check_file
 from flagdata.core.parts import attribute
 from flagdata.core.shell import command_line
 from flagdata.errors import MissingExtraError, UnknownNameError, UsageError
 from flagdata.recipes.registry import PlugInError, Registry
 from flagdata.recipes.shelves import Shelf
-from flagdata.verbs.verb_options import Result, argument, options, verb
+from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
 
 @options
@@ -25,7 +27,14 @@ class Named:
     """Names of which kind are listed."""
 
     kind: str | None = argument("Of the names; all kinds by default.", "[KIND]", default=None)
-    name: str | None = argument("The one whose recipe is printed.", "[NAME]", default=None)
+    name: str | None = argument(
+        "The one whose recipe is printed; of effects, what it is.", "[NAME]", default=None
+    )
+    report: Path | None = option(
+        "Write the page of an effect, which shows where on a flag it acts.",
+        metavar="FILE",
+        default=None,
+    )
 
 
 @verb(Named, example='flagdata.catalog("effects")["kinds"]')
@@ -34,17 +43,34 @@ def catalog(chosen: Named) -> Iterator[Result]:
     models and more.
 
     With KIND that kind alone, a line on each name. With NAME its recipe, as TOML to copy and
-    change: of scenes, data sets, trainings, materials and sensors. What a lake holds is listed by
-    `flagdata ls`.
+    change: of scenes, data sets, trainings, materials and sensors; of an effect its equation,
+    parameters, and how verdicts weigh it. What a lake holds is listed by `flagdata ls`.
 
     \b
       flagdata catalog datasets flagsim-small > mine.toml
+      flagdata catalog effects lift --report lift.html
     """
-    from flagdata.cli import NAMES
+    from flagdata.cli import ANSWERED, NAMES
 
     kind = chosen.kind
     if kind is not None and kind not in NAMES:
         raise UnknownNameError.of("kind of name", kind, NAMES)
+    if chosen.report is not None:
+        if kind not in ANSWERED or chosen.name is None:
+            raise UsageError(
+                "a page is written of one effect alone",
+                where="--report",
+                fix="give effects and the name of one, or leave it out",
+            )
+        check_file(chosen.report, command="catalog")
+    if kind in ANSWERED and chosen.name is not None:
+        with explaining_missing():
+            answer: Answer = attribute(ANSWERED[kind])(chosen.name)
+        yield Result("catalog-effect", answer.document)
+        _print_answer(answer)
+        if chosen.report is not None:
+            say(f"report: {answer.save(chosen.report)}")
+        return
     if kind is not None and chosen.name is not None:
         found_recipe = recipe_of(kind, chosen.name)
         yield Result("catalog-recipe", {"kind": kind, "name": chosen.name, "recipe": found_recipe})
@@ -78,6 +104,23 @@ def catalog(chosen: Named) -> Iterator[Result]:
                     width=80,
                 )
             )
+
+
+def _print_answer(answer: Answer) -> None:
+    """Prints an answer's sentence, facts and tables."""
+    facts = [f"{name}: {text}" for name, text in answer.head.facts.items()]
+    for text in (f"{answer.subject}: {answer.sentence}", *answer.head.remarks, *facts):
+        for paragraph in str(text).split("\n\n"):
+            echo_lines(textwrap.fill(" ".join(paragraph.split()), width=100))
+        echo()
+    for section in answer.make_sections():
+        for part in section.parts:
+            if isinstance(part, Table) and part.columns:
+                table(part.columns, part.rows)
+                echo()
+            elif isinstance(part, Table):
+                for name, text in part.rows:
+                    echo_lines(textwrap.fill(f"{name}: {text}", width=100, subsequent_indent="  "))
 
 
 def recipe_of(kind: str, name: str) -> str:

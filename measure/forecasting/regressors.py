@@ -320,7 +320,7 @@ def library() -> tuple[EffectColumn, ...]:
     """Lists the strengths that are weighed on markers and meshes, and `TURNED`; those of installed
     packages last."""
     weighed = {column.name for column in weighed_columns(Need.MARKERS)}
-    return tuple(column for column in _strengths() if column.name in {*weighed, TURNED})
+    return tuple(column for column in registered_columns() if column.name in {*weighed, TURNED})
 
 
 def weighed_columns(kind: Need) -> tuple[EffectColumn, ...]:
@@ -333,12 +333,13 @@ def weighed_columns(kind: Need) -> tuple[EffectColumn, ...]:
     never = {Need.MARKERS, Need.FILMS, Need.MAST} - {kind}
     return tuple(
         column
-        for column in _strengths()
+        for column in registered_columns()
         if not column.kind.unweighed and never.isdisjoint(column.kind.needs)
     )
 
 
-def _strengths() -> tuple[EffectColumn, ...]:
+def registered_columns() -> tuple[EffectColumn, ...]:
+    """Lists the strengths of all effects of the registry that can be used."""
     return tuple(
         EffectColumn(
             effect=name,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.recipes.registry import PlugInError
-from measure.forecasting.regressors import EffectColumn, weighed_columns
+from measure.forecasting.regressors import EffectColumn, registered_columns, weighed_columns
 from sim.effects import EFFECTS
 from sim.effects.weighing import Need
 
@@ -61,16 +61,20 @@ class Strengths:
 
 def on_markers() -> tuple[Strengths, ...]:
     """Lists the strengths of the effects that verdicts on markers and meshes weigh."""
-    return _strengths_of(Need.MARKERS)
+    return _strengths_of(weighed_columns(Need.MARKERS))
 
 
 def on_films() -> tuple[Strengths, ...]:
     """Lists the strengths of the effects that verdicts on films weigh."""
-    return _strengths_of(Need.FILMS)
+    return _strengths_of(weighed_columns(Need.FILMS))
 
 
-def _strengths_of(kind: Need) -> tuple[Strengths, ...]:
-    columns = weighed_columns(kind)
+def every_strength() -> tuple[Strengths, ...]:
+    """Lists the strengths of all effects of the registry, weighed or not."""
+    return _strengths_of(registered_columns())
+
+
+def _strengths_of(columns: Sequence[EffectColumn]) -> tuple[Strengths, ...]:
     ranges = [column.described.weighed_range for column in columns]
     return tuple(
         Strengths(column=column, low=low, high=high)

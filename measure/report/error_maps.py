@@ -85,14 +85,18 @@ def effect_chart(residual: Residual) -> Chart | None:
     )
     if not before.size or before.shape != after.shape:
         return None
-    moved = after - before
+    return moved_chart(residual.markers, after - before)
+
+
+def moved_chart(markers: Sequence[Sequence[float]], moved: FloatArray) -> Chart:
+    """Draws the mean of displacements (frame, marker, 3) [m] over the cloth, in each direction."""
     known = np.isfinite(moved)
     mean = np.where(known, moved, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     mean[~known.any(axis=0)] = np.nan
     reach = largest(mean.ravel().tolist())
     parts = [(f"in {axis}", mean[:, i].tolist()) for i, axis in _AXES]
     shade = Shade(low=-reach, high=reach)
-    return Chart(rows=[maps(residual.markers, parts, shade, "mean change")], height=2.7)
+    return Chart(rows=[maps(markers, parts, shade, "mean change")], height=2.7)
 
 
 def maps(

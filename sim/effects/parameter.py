@@ -95,7 +95,7 @@ class Parameter(Described):
     @property
     def small_step(self) -> float:
         """Returns the step by which its sensitivity is found, toward where more is weighed."""
-        return self.step or max(self.weighed_range, key=abs) / 10
+        return self.step or max(self.weighed_range, key=lambda end: (abs(end), end)) / 10
 
     def check(self, value: Value, *, where: str) -> None:
         """Refuses what is not finite or not admissible.

@@ -24,6 +24,10 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
         ("calibrate", "nowhere.csv", "--flag-size", "1.5x1.0", "--report", "{out}/a.html"),
         "a.html",
     ),
+    "catalog --report": (
+        ("catalog", "effects", "lift", "--report", "{out}/a.html"),
+        "a.html",
+    ),
     "measure --zarr": (("measure", "nowhere.mp4", "--zarr", "{out}"), "mine"),
     "evaluate --out": (
         ("evaluate", "flow", "--lake", "nowhere", "--out", "{out}"),

@@ -111,6 +111,8 @@ def outcome(specimen: Specimen) -> LoopOutcome:
         proposal="",
         separating="",
         assumptions=(),
+        unweighed=(),
+        copied=(),
         ranking=(),
         named=(),
     )

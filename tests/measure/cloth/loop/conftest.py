@@ -72,8 +72,13 @@ def readings(batch: FlagBatch, *, foreign: float = 0.0) -> FloatArray:
         "hem-mass.line_density": (3, 0.0),
         "air-density.change": (7, 0.4),
         "power-law-drag.exponent": (7, 0.4),
+        "fan.acceleration": (7, 0.4),
     }
-    most = {"lift.coefficient": 8.0, "tangential-linear-drag.coefficient": 1.5}
+    most = {
+        "lift.coefficient": 8.0,
+        "tangential-linear-drag.coefficient": 1.5,
+        "fan.acceleration": 10.0,
+    }
     for column, strength in batch.effects:
         which, size = patterns[column.name]
         out[..., which] += size * (strength / most.get(column.name, 0.8))[:, None]
