@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from flagdata.answer.answer import Answer, Table
-from flagdata.core.console import echo, echo_lines, say, table
+from flagdata.core.console import LocalPath, echo, echo_lines, say, table
 from flagdata.core.extras import explaining_missing
 from flagdata.core.files.outputs import check_file
 from flagdata.core.parts import attribute
@@ -32,8 +32,9 @@ class Named:
     )
     report: Path | None = option(
         "Write the page of an effect, which shows where on a flag it acts.",
-        metavar="FILE",
         default=None,
+        type=LocalPath(),
+        metavar="FILE",
     )
 
 

@@ -78,17 +78,18 @@ def weighable(flag: Flag) -> tuple[Weighable, ...]:
     )
 
 
-def filmed(flag: Flag, area_weight: tuple[float, float] | None) -> frozenset[Need]:
+def filmed(flag: Flag, weight_uncertainty: float | None) -> frozenset[Need]:
     """Lists what films of a flag beside a log have of that which effects need: the picture shows
     where it is attached, and how the pole leans.
 
     Args:
-        area_weight: as stated, with its standard deviation [kg/m²]; None where it is not.
+        weight_uncertainty: relative standard uncertainty of the stated area weight; None where none
+            is stated.
     """
     has = {Need.FILMS, Need.STILL, Need.TURBULENCE, Need.ANCHORS}
     if flag.attachment == "corners":
         has.add(Need.FREE_HOIST)
-    if area_weight is not None and area_weight[1] <= STATED_WEIGHT * area_weight[0]:
+    if weight_uncertainty is not None and weight_uncertainty <= STATED_WEIGHT:
         has.add(Need.AREA_WEIGHT)
     return frozenset(has)
 

@@ -35,7 +35,7 @@ from measure.cloth.model_evidence import (
     quantiles,
 )
 from measure.cloth.observed_recording import Observed
-from measure.cloth.simulations import of_recordings
+from measure.cloth.simulations import deviation_of, of_recordings
 from measure.cloth.unseen_windows import compare_models
 from measure.forecasting.setting import Stage
 from measure.forecasting.strengths import what_copies, why_unweighed
@@ -78,7 +78,9 @@ def close_loop(
 def verdict_of(outcome: SolvedLoop) -> Verdict:
     """Returns the verdict in numbers and sentences."""
     decision, options = outcome.judged, outcome.options
-    has = filmed(options.calibration.flag, options.area_weight)
+    weight = options.area_weight
+    uncertainty = None if weight is None else deviation_of(weight) / weight.middle
+    has = filmed(options.calibration.flag, uncertainty)
     effects = outcome.weighing.effects
     names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
     acting = outcome.best if decision.named else None

@@ -57,7 +57,7 @@ class Profile(Fan):
 
     needs = {Need.MAST: "the profile is no other way to be known"}
 '''
-KINDS, DURATION, NOISE = 9, 4.6, 5e-4
+KINDS, LEVEL, DURATION, NOISE = 6, 0.15, 4.6, 5e-4
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_it_is_a_candidate_of_both_kinds_of_verdict_at_the_strengths_of_its_prio
 def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
     fan: type[Effect], specimen: Specimen, tmp_path: Path
 ) -> None:
-    """Nine kinds of numerics, the fewest that can test a level of 0.1."""
+    """Six kinds of numerics, the fewest that can test a level of 0.15."""
     alike = {
         "markers": specimen.mesh.rest,
         "rate": 25.0,
@@ -115,7 +115,7 @@ def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
         effects=(fan(acceleration=6.0),),
     )
     experiment = Experiment(specimen=specimen, recordings=tuple(blown.simulate()))
-    found = close_loop(experiment, LoopOptions(bank=tmp_path, level=0.1))
+    found = close_loop(experiment, LoopOptions(bank=tmp_path, level=LEVEL))
     assert (found.conclusion, found.named) == (Conclusion.EFFECT, ("fan",))
     (named,) = (one for one in found.ranking if not one.why_not)
     assert named.strength.low < 6.0 < named.strength.high
