@@ -112,7 +112,7 @@ def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
         speeds=(3.5, 6.0),
         calibrations=(Calibration(area_weight=1.1, bending=0.7, damping=2e-3),) * 2,
         seed=77,
-        effects=(fan(acceleration=6.0),),
+        effects=(fan(acceleration=6.0),),  # pyright: ignore[reportCallIssue]
     )
     experiment = Experiment(specimen=specimen, recordings=tuple(blown.simulate()))
     found = close_loop(experiment, LoopOptions(bank=tmp_path, level=LEVEL))

@@ -169,9 +169,7 @@ def test_p_near_the_level_is_undecided(
 
 
 def test_only_what_markers_weigh_can_be_suspected_of_them() -> None:
-    assert {one.name for one in on_films()} - {one.name for one in on_markers()} == {
-        "slack.length"
-    }
+    assert {one.name for one in on_films()} - {one.name for one in on_markers()} == {"slack.length"}
     with pytest.raises(UnknownNameError):
         Suspicion.parse("slack", on_markers())
 

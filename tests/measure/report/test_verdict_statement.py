@@ -158,8 +158,9 @@ def test_what_was_not_weighed_is_listed_with_its_reason_and_what_is_copied_with_
     told = replace(outcome.experiment.specimen, area_weight_uncertainty=0.03)
     weighed = replace(outcome, experiment=replace(outcome.experiment, specimen=told))
     assert {*dict(said.copied)} - {*dict(with_sentences(weighed).copied)} == {"wet-mass"}
-    assert "the cloth's area weight, stated to a few percent, would show it" in (
-        dict(said.copied)["wet-mass"]
+    assert (
+        "the cloth's area weight, stated to a few percent, would show it"
+        in (dict(said.copied)["wet-mass"])
     )
 
 
