@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from flagdata.core.stated import Stated
     from flagdata.lake import Lake
 
-JUDGED, MORE = "What is judged", "More in the table"
+JUDGED = "What is judged"
 
 
 @options
@@ -182,25 +182,6 @@ class Evaluating(OfInputs, Shared):
         section=JUDGED,
         type=STATED,
         metavar="VALUE",
-    )
-    handmade: bool = option(
-        "Add ridge and gradient boosting on hand-made features.", default=False, section=MORE
-    )
-    frames: tuple[int, ...] = option(
-        "Also report triplet accuracy for clips of N frames (networks on maps only); may be "
-        "repeated.",
-        default=(),
-        section=MORE,
-        type=click.IntRange(min=4),
-        metavar="N",
-    )
-    linear: bool = option(
-        "Also report how well a linear model predicts cloth parameters from each embedding.",
-        default=False,
-        section=MORE,
-    )
-    tsne: str | None = option(
-        "Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL"
     )
     out: Path | str = option(
         "Where the page, the table in Markdown and the JSON go.",

@@ -15,7 +15,6 @@ EXTRAS = {
     "cv2": "physics",
     "safetensors": "physics",
     "matplotlib": "plots",
-    "sklearn": "learn",
     "psutil": "learn",
     "dask": "cluster",
     "distributed": "cluster",

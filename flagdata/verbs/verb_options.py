@@ -57,7 +57,6 @@ SECTIONS = (
     "The clock",
     "The recording",
     "What is judged",
-    "More in the table",
     "The flag",
     "The flag and the camera",
     "The film",

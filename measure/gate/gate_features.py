@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.gate.checks import measure_statistics
-from models.regression.handmade import features as handmade
+from models.maps.handmade import features as handmade
 from models.trained.estimator import Estimator
 from models.trained.outliers import Familiarity
 
@@ -28,7 +28,7 @@ class Features:
 
     Attributes:
         checks: (len(CHECKS),) of `measure.gate.checks`.
-        handmade: (len(FEATURES),) of `models.regression.handmade`.
+        handmade: (len(FEATURES),) of `models.maps.handmade`.
         summary: (d,) of the network's first learner.
         distance: of the summary to the training clips' (`models.trained.outliers`).
         moved: (len(MOVES),) whitened distances that the summary moves by.

@@ -9,7 +9,6 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from models.evaluation.bootstrap import Resamples, estimate
-    from models.evaluation.linear import bouman
     from models.evaluation.predictions import Predictions
     from models.evaluation.predictive_calibration import LEVELS, coverage, rank_histogram, tarp
     from models.evaluation.scores import SCORES

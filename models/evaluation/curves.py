@@ -1,5 +1,4 @@
-"""Scores against what a model was given: how many sequences it was trained on, how many frames it
-saw."""
+"""Scores against what a model was given: how many sequences it was trained on."""
 
 from __future__ import annotations
 
@@ -25,31 +24,19 @@ class LearningPoint:
     score: ScoreEstimate
 
     def __post_init__(self) -> None:
-        _check(f"learning curve of {self.label!r}", self.sequences, "sequences", self.score)
+        check_point(f"learning curve of {self.label!r}", self.sequences, "sequences", self.score)
 
 
-@dataclass(frozen=True, kw_only=True)
-class FramesPoint:
-    """Triplet accuracy of a model that sees so many frames."""
+def check_point(where: str, size: int, noun: str, score: ScoreEstimate) -> None:
+    """Refuses a point of a curve that makes no sense.
 
-    JSON_NAMES: ClassVar = ("label", "frames", "accuracy=score.value", "interval=score.interval")
+    Args:
+        where: the curve, for messages.
+        size: what the model was given, in so many of `noun`.
 
-    label: str
-    frames: int
-    score: ScoreEstimate
-
-    def __post_init__(self) -> None:
-        where = f"triplet accuracy of {self.label!r} against frames"
-        _check(where, self.frames, "frames", self.score)
-        if self.score.value > 1:
-            raise InputError(
-                f"the triplet accuracy is {self.score.value:g}, above 1",
-                where=where,
-                fix="give a share, not per cent",
-            )
-
-
-def _check(where: str, size: int, noun: str, score: ScoreEstimate) -> None:
+    Raises:
+        InputError: nothing was given, or the score is no number with its interval.
+    """
     low, high = score.quantity.interval
     if size < 1 or not 0 <= score.value < float("inf") or not low <= high:
         raise InputError(

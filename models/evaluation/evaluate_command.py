@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,6 @@ from flagdata.core.console import echo_lines, progress, say
 from flagdata.core.files.addresses import local_path
 from flagdata.core.provenance import canonical
 from flagdata.core.stated import Stated
-from flagdata.errors import InputError
 from flagdata.timebase import NANOSECONDS
 from flagdata.verbs.verb_options import Result, verb
 
@@ -26,10 +25,9 @@ if TYPE_CHECKING:
     from flagdata.dataset import Pairs, Source
     from flagdata.dataset.pair_table import PairTable
     from flagdata.lake import Artifact
-    from models.evaluation.curves import FramesPoint, LearningPoint
-    from models.evaluation.evaluation import Evaluation, Read
+    from models.evaluation.curves import LearningPoint
+    from models.evaluation.evaluation import Evaluation
     from models.evaluation.predictions import Predictions
-    from models.maps.crops import Cropping
     from models.maps.frontend import FrontEnd
     from models.trained.estimator import Estimator
     from models.training.inputs import Prepared
@@ -65,16 +63,9 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
     source = open_source(chosen.lake)
     folder = chosen.inputs(source.lake)
     weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
-    desk = _Desk(source, chosen.dataset, chosen.at, folder, chosen.processes, chosen.seed, weight)
-    evaluation = desk.evaluation(
-        chosen.models,
-        side=chosen.side,
-        reference=chosen.reference,
-        tsne=chosen.tsne,
-        handmade=chosen.handmade,
-        frames=chosen.frames,
-        linear=chosen.linear,
-    )
+    desk = Desk(source, chosen.dataset, chosen.at, folder, chosen.processes, chosen.seed, weight)
+    judged = desk.judge(desk.choose(chosen.models, chosen.side), chosen.side)
+    evaluation = desk.evaluation(judged, side=chosen.side, reference=chosen.reference)
     answer = evaluation_report.write(evaluation, out, name=chosen.name)
     yield Result("evaluation", answer.document, answer=answer)
     echo_lines(evaluation_report.markdown(evaluation))
@@ -134,7 +125,27 @@ def label_networks(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Ar
     ]
 
 
-class _Desk:
+@dataclass(kw_only=True)
+class Judged:
+    """What models said of the clips of one side.
+
+    Attributes:
+        evaluated: models of the table.
+        learned: networks of the lake, what each learned from, and what it said.
+        curves: labels of networks that make a learning curve.
+    """
+
+    evaluated: list[Predictions] = field(default_factory=list)
+    learned: list[tuple[Artifact, DataSpec, Predictions]] = field(default_factory=list)
+    curves: set[str] = field(default_factory=set)
+
+    @property
+    def shown(self) -> list[Predictions]:
+        """Returns the models of the table: those of learning curves where there are no others."""
+        return self.evaluated or [predictions for *_, predictions in self.learned]
+
+
+class Desk:
     """Where models are judged: a data set, and what was prepared of it."""
 
     def __init__(
@@ -154,63 +165,62 @@ class _Desk:
         self._head_of: dict[str, str] = {}
         self._prepared: dict[tuple[str, str], Prepared] = {}
 
-    def evaluation(
-        self,
-        names: Sequence[str],
-        *,
-        side: str,
-        reference: str | None,
-        tsne: str | None,
-        handmade: bool,
-        frames: Sequence[int],
-        linear: bool,
-    ) -> Evaluation:
-        from models.evaluation.evaluation import evaluate as scored
+    def choose(
+        self, names: Sequence[str], side: str
+    ) -> Sequence[tuple[Artifact | None, Estimator]]:
+        """Finds networks by name that did not learn from the clips of a side and can judge them.
+
+        Raises:
+            InputError: films too short or too slow for a network, or that state none of its
+                targets.
+            RefusedError: a clip that one has learned from.
+            UnknownNameError: no such network.
+        """
         from models.training.training_recipe import DataSpec
 
-        evaluated: list[Predictions] = []
-        learned: list[tuple[Artifact, DataSpec, Predictions]] = []
-        curves: set[str] = set()
         chosen = self._models(names)
         trained_on = [
             DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen
         ]
         refuse_learned(self._catalog(), trained_on, dataset=self._dataset, side=side)
-        # First: what cannot be judged, lengths that no film has and networks that are none on maps
-        # are refused before the rest is computed.
-        self._check([estimator for _, estimator in chosen], side, handmade=handmade, linear=linear)
-        triplets = self._triplets([estimator for _, estimator in chosen], frames, side)
+        self._check([estimator for _, estimator in chosen], side)
+        return chosen
+
+    def judge(self, chosen: Sequence[tuple[Artifact | None, Estimator]], side: str) -> Judged:
+        """Predicts the clips of a side by networks that were chosen for it."""
+        from models.training.training_recipe import DataSpec
+
+        judged = Judged()
         for row, estimator in chosen:
             predictions = self._predictions(estimator, side)
             data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
             if data.sequences is None or row is None:
-                evaluated.append(predictions)
+                judged.evaluated.append(predictions)
             else:
-                curves.add(predictions.label)
+                judged.curves.add(predictions.label)
             if row is not None:
-                learned.append((row, data, predictions))
-        if handmade:
-            evaluated += self._handmade(side)
-        evaluated = evaluated or [predictions for *_, predictions in learned]
-        data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._statement_text}"
+                judged.learned.append((row, data, predictions))
+        return judged
+
+    def evaluation(self, judged: Judged, *, side: str, reference: str | None) -> Evaluation:
+        """Scores what was said of the clips of a side."""
+        from models.evaluation.evaluation import evaluate as scored
+
         return scored(
-            evaluated,
-            data=data,
+            judged.shown,
+            data=f"{self._dataset}, {side} side, at {self._at or 'head'}{self._statement_text}",
             seed=self._seed,
             reference=reference,
-            tsne_of=tsne,
-            frames=triplets,
-            reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points(
                 [
                     (data.sequences or self._sequences(row, data), predictions)
-                    for row, data, predictions in learned
-                    if predictions.label in curves
+                    for row, data, predictions in judged.learned
+                    if predictions.label in judged.curves
                 ]
             ),
             unseen=side != "train",
             split=side,
-            split_by=self._side(side).split_by,
+            split_by=self.side(side).split_by,
         )
 
     @cached_property
@@ -237,34 +247,26 @@ class _Desk:
             )
         )
 
-    def _check(
-        self, chosen: Sequence[Estimator], side: str, *, handmade: bool, linear: bool
-    ) -> None:
+    def _check(self, chosen: Sequence[Estimator], side: str) -> None:
         """Checks that the clips of a side can be judged, before any is prepared.
 
         Raises:
             InputError: their films are too short or too slow for a model, or state none of its
                 targets.
         """
-        from models.evaluation.embeddings import quantities
-        from models.evaluation.feature_baselines import check_stated
         from models.evaluation.predict import judged_targets
         from models.networks.learner import Loss
         from models.training.stated_films import StatedFilms
 
-        pairs = self._side(side)
+        pairs = self.side(side)
         parameters = pairs.table.parameter_columns()
         films = StatedFilms.of(self._source.lake, pairs, at=self._at)
         for estimator in chosen:
             films.check_judged(estimator.front_end, estimator.cropping, model=estimator.name)
             fitted_on = []
             if estimator.learners[0].objective is Loss.CONTRASTIVE:
-                fitted_on.append(self._side("train").table.parameter_columns())
+                fitted_on.append(self.side("train").table.parameter_columns())
             judged_targets(estimator, parameters, *fitted_on)
-        if handmade:
-            check_stated(self._side("train"), pairs)
-        if linear:
-            quantities(parameters)
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
         from flagdata.core.schema import Kind
@@ -301,7 +303,8 @@ class _Desk:
             )
         return chosen
 
-    def _side(self, side: str) -> Pairs:
+    def side(self, side: str) -> Pairs:
+        """Returns the clips of a side of the data set."""
         from models.training.training_recipe import DataSpec
 
         if side not in self._pairs:
@@ -317,7 +320,7 @@ class _Desk:
 
         key = (side, estimator.front_end.hash)
         if key not in self._prepared:
-            pairs = self._side(side)
+            pairs = self.side(side)
             with progress(
                 len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip"
             ) as advance:
@@ -340,55 +343,11 @@ class _Desk:
             estimator,
             self._clips(side, estimator),
             label=estimator.name,
-            note=_note(estimator, self._side(side).table),
+            note=_note(estimator, self.side(side).table),
             seed=self._seed,
-            milliseconds=time_a_clip(estimator, self._side(side)),
+            milliseconds=time_a_clip(estimator, self.side(side)),
             known=self._known,
             fitted_on=self._clips("train", estimator) if contrast else None,
-        )
-
-    def _triplets(
-        self, chosen: Sequence[Estimator], frames: Sequence[int], side: str
-    ) -> list[FramesPoint]:
-        """Computes triplet accuracies of the networks on maps, by label, for clips of so many
-        frames."""
-        from models.evaluation.embeddings import takes_any_length, triplet_accuracies
-        from models.training.inputs import film_rows, prepare_films
-
-        def films(front_end: FrontEnd, cropping: Cropping) -> Prepared:
-            count = len(film_rows(self._side(side), sequences=None, seed=0))
-            with progress(count, f"prepare {front_end.frames} frames of {side}", "film") as advance:
-                return prepare_films(
-                    self._side(side),
-                    front_end,
-                    cropping,
-                    variants=1,
-                    folder=self._cache,
-                    workers=self._workers,
-                    advance=advance,
-                )
-
-        labels: dict[str, list[Estimator]] = {}
-        for estimator in chosen:
-            if takes_any_length(estimator):
-                labels.setdefault(estimator.name, []).append(estimator)
-        if frames and not labels:
-            raise InputError(
-                "none of the networks is one on maps",
-                where="--frames",
-                fix="name one, such as wave or sdn, or leave --frames out",
-            )
-        return [
-            point
-            for runs in labels.values()
-            for point in triplet_accuracies(runs, frames, films, seed=self._seed)
-        ]
-
-    def _reads(self, evaluated: Sequence[Predictions], side: str, data: str) -> list[Read]:
-        from models.evaluation.embeddings import readouts
-
-        return readouts(
-            evaluated, self._side(side).table.parameter_columns(), data=data, seed=self._seed
         )
 
     @property
@@ -404,18 +363,6 @@ class _Desk:
         comes from."""
         pairs = self._source.pairs(data.rows, at=self._head_of[network.id], split="train")
         return len(set(pairs.table.seed.tolist()))
-
-    def _handmade(self, side: str) -> list[Predictions]:
-        from models.evaluation.feature_baselines import predictions
-
-        return predictions(
-            self._side("train"),
-            self._side(side),
-            cache=self._cache,
-            workers=self._workers,
-            seed=self._seed,
-            bars=progress,
-        )
 
 
 def _card(estimator: Estimator) -> Any:

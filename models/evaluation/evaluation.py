@@ -4,8 +4,8 @@ made of."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +13,9 @@ from flagdata.core import rng
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.json_values import json_values
 from flagdata.errors import UnknownNameError
-from models.evaluation import paper, score_table, triplets
-from models.evaluation.bootstrap import DRAWS, Resamples, ScoreEstimate
-from models.evaluation.curves import FramesPoint, LearningPoint
-from models.evaluation.linear import Readout
+from models.evaluation import score_table, triplets
+from models.evaluation.bootstrap import DRAWS, Resamples
+from models.evaluation.curves import LearningPoint
 from models.evaluation.predictions import WIND, Predictions
 from models.evaluation.predictive_calibration import (
     CURVE,
@@ -28,7 +27,6 @@ from models.evaluation.predictive_calibration import (
     tarp,
 )
 from models.evaluation.scores import BinError, error_against
-from models.evaluation.tsne import TsneLayout, layout
 
 SCHEMA = "flagdata.evaluation/1"
 _LEVELS = tuple(sorted({*CURVE, *LEVELS}))
@@ -62,28 +60,12 @@ class Expected:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Read:
-    """The linear readout of a model's embedding on some data set."""
-
-    JSON_NAMES: ClassVar = ("label", "data", "components=readout.components", "pearson")
-
-    label: str
-    data: str
-    readout: Readout
-
-    @property
-    def pearson(self) -> dict[str, ScoreEstimate]:
-        """Returns Pearson's r of each target."""
-        return dict(zip(self.readout.targets, self.readout.pearson, strict=True))
-
-
-@dataclass(frozen=True, kw_only=True)
 class Evaluation:
     """All scores of all models on the same clips.
 
     Attributes:
         data: what was tested on, as data set and tag.
-        seed: of resamples, triplets, reference points and t-SNE.
+        seed: of resamples, triplets and reference points.
         clips, groups: tested on; groups are sequences.
         rows: of the table.
         targets: scores of every target.
@@ -91,7 +73,7 @@ class Evaluation:
             asked for, None if no model gives the wind.
         differences: paired, over the same draws of sequences.
         wind_errors, calibrations, expected: of the models that have them.
-        learning, frames, reads, layout: given, or made of what was given.
+        learning: as it was given.
         findings: what a reader has to know.
         unseen: whether no model learned from these sequences.
         split, split_by: the side that was judged, and how sides were decided, see
@@ -110,9 +92,6 @@ class Evaluation:
     calibrations: tuple[CalibrationCurve, ...]
     expected: tuple[Expected, ...]
     learning: tuple[LearningPoint, ...]
-    frames: tuple[FramesPoint, ...]
-    reads: tuple[Read, ...]
-    layout: TsneLayout | None
     findings: tuple[Finding, ...]
     unseen: bool
     split: str | None
@@ -127,9 +106,6 @@ def evaluate(
     draws: int = DRAWS,
     reference: str | None = None,
     learning: Sequence[LearningPoint] = (),
-    frames: Sequence[FramesPoint] = (),
-    reads: Sequence[Read] = (),
-    tsne_of: str | None = None,
     unseen: bool = True,
     split: str | None = None,
     split_by: Mapping[str, Any] | None = None,
@@ -142,20 +118,17 @@ def evaluate(
         seed: of all that is drawn.
         draws: of the bootstrap.
         reference: label that the others are compared with.
-        learning, frames, reads: scores of models on other data, shown beside these.
-        tsne_of: label whose first run's embedding is laid out; needs scikit-learn.
+        learning: scores of models that were trained on fewer sequences, shown beside these.
         unseen: whether no model learned from these sequences.
         split, split_by: of the pairs that were judged, see `flagdata.dataset.Pairs`.
 
     Raises:
         InputError: predictions that are not of the same clips.
         UnknownNameError: a label that no model has.
-        UsageError: t-SNE without scikit-learn.
     """
     models = score_table.models(predictions)
-    for label in (reference, tsne_of):
-        if label is not None and label not in models:
-            raise UnknownNameError.of("model", label, models)
+    if reference is not None and reference not in models:
+        raise UnknownNameError.of("model", reference, models)
     group = predictions[0].group
     resamples = Resamples.of(
         group, generator=rng.stream(seed, "evaluation", "bootstrap"), draws=draws
@@ -245,17 +218,7 @@ def evaluate(
         split=split,
         split_by=split_by,
         learning=tuple(learning),
-        frames=tuple(frames),
-        reads=tuple(reads),
-        layout=None if tsne_of is None else layout(models[tsne_of][0], seed=seed),
-        findings=(
-            *findings,
-            *(
-                replace(f, where=f"{read.label} on {read.data}")
-                for read in reads
-                for f in read.readout.findings
-            ),
-        ),
+        findings=tuple(findings),
     )
 
 
@@ -281,15 +244,5 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
         "calibration": json_values(evaluation.calibrations),
         "tarp": json_values(evaluation.expected),
         "learning": json_values(evaluation.learning),
-        "frames": json_values(evaluation.frames),
-        "linear": json_values(evaluation.reads),
-        "t_sne": json_values(evaluation.layout),
-        "paper": {
-            "warning": paper.WARNING,
-            "flagsim": json_values(paper.FLAGSIM),
-            "triplets": [
-                {"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS
-            ],
-        },
         "findings": json_values(evaluation.findings),
     }

@@ -1,5 +1,5 @@
-"""What the charts of an evaluation show: errors against the true wind, calibration, ranks, curves,
-the embedding."""
+"""What the charts of an evaluation show: errors against the true wind, calibration, ranks,
+curves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from flagdata.answer.charts import (
     Band,
     Bins,
     Chart,
-    Cloud,
     Colour,
     Dots,
     Line,
@@ -24,11 +23,9 @@ from flagdata.answer.charts import (
     Shade,
 )
 from flagdata.answer.quantity import Quantity
-from models.evaluation import paper
-from models.evaluation.curves import FramesPoint, LearningPoint
+from models.evaluation.curves import LearningPoint
 from models.evaluation.evaluation import CalibrationCurve, Expected, WindError
 from models.evaluation.predictive_calibration import CURVE, LEVELS, Coverage
-from models.evaluation.tsne import TsneLayout
 
 _MARKERS = "osD^vPX<>h"
 _OPACITY = 0.13
@@ -183,7 +180,7 @@ def learning(points: Sequence[LearningPoint]) -> Chart:
         rows=[
             [
                 Panel(
-                    marks=_curves([(p.label, p.sequences, p.score.quantity) for p in points]),
+                    marks=curves([(p.label, p.sequences, p.score.quantity) for p in points]),
                     x=Axis(label="sequences trained on", logarithmic=True, ticks=sequences),
                     y=Axis(
                         label="wind RMSE [m/s]",
@@ -197,7 +194,7 @@ def learning(points: Sequence[LearningPoint]) -> Chart:
     )
 
 
-def _curves(points: Sequence[tuple[str, int, Quantity]]) -> list[Mark]:
+def curves(points: Sequence[tuple[str, int, Quantity]]) -> list[Mark]:
     """Draws a line a label through its scores, by what they were given."""
     look = _look(label for label, *_ in points)
     marks: list[Mark] = []
@@ -219,36 +216,3 @@ def _round_ticks(scores: Sequence[Quantity]) -> list[float]:
     all_ticks = [digit * 10.0**power for power in range(-3, 2) for digit in (1, 2, 3, 5)]
     inside = [tick for tick in all_ticks if low / 1.6 <= tick <= high * 1.6]
     return [round(tick, 6) for tick in inside]
-
-
-def frames(points: Sequence[FramesPoint]) -> Chart:
-    """Shows triplet accuracy over the frames a model sees, beside the paper's."""
-    size, accuracy = zip(*paper.TRIPLETS, strict=True)
-    quoted = Line(
-        x=size,
-        y=accuracy,
-        colour=Colour.QUIET,
-        dashed=True,
-        width=1.1,
-        label="SDN, quoted from the paper",
-    )
-    marks = _curves([(p.label, p.frames, p.score.quantity) for p in points])
-    return Chart(
-        rows=[
-            [
-                Panel(
-                    marks=[*marks, quoted],
-                    x=Axis(label="frames"),
-                    y=Axis(label="triplet accuracy", limits=(None, 1)),
-                )
-            ]
-        ],
-        height=3.2,
-    )
-
-
-def t_sne(layout: TsneLayout) -> Chart:
-    """Shows the embedding in the plane with the true wind as colour."""
-    x, y = layout.places.T
-    cloud = Cloud(x=x, y=y, values=layout.wind, label="true wind speed [m/s]")
-    return Chart(rows=[[Panel(marks=[cloud], equal=True, framed=False)]], height=5.0, width=6.2)

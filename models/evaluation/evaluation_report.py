@@ -17,7 +17,7 @@ from flagdata.core.provenance import code_version
 from flagdata.errors import UsageError
 from models.evaluation import evaluation_charts as charts
 from models.evaluation import evaluation_tables as tables
-from models.evaluation import paper, score_table
+from models.evaluation import score_table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.evaluation import Evaluation, as_document
 from models.evaluation.evaluation_arrays import arrays_of
@@ -34,10 +34,15 @@ def write(evaluation: Evaluation, folder: Path, *, name: str = "evaluation") -> 
             since.
     """
     answer = answer_of(evaluation)
-    document = json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    contents = (answer.page, document, markdown(evaluation))
-    write_files(folder, dict(zip(names(name), contents, strict=True)), command=_COMMAND)
+    write_answer(answer, markdown(evaluation), folder, name=name)
     return answer
+
+
+def write_answer(answer: Answer, words: str, folder: Path, *, name: str) -> None:
+    """Writes an answer's page and document, and its words in Markdown; raises as `write`."""
+    document = json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    contents = (answer.page, document, words)
+    write_files(folder, dict(zip(names(name), contents, strict=True)), command=_COMMAND)
 
 
 def check(folder: Path, *, name: str) -> None:
@@ -147,19 +152,6 @@ def _sections(evaluation: Evaluation) -> Iterator[Section]:
         title="Every target", parts=[tables.targets(evaluation)], anchor="targets", folded=True
     )
     yield from _figure_sections(evaluation)
-    if (made := tables.linear(evaluation)) is not None:
-        about = (
-            "Principal components, then linear regression, each group left out of both; Pearson's "
-            "r of the logarithm (Bouman et al. 2013)."
-        )
-        title = "Linear readout of the embedding"
-        yield Section(title=title, parts=[about, made], anchor="linear", folded=True)
-    yield Section(
-        title="What the paper printed",
-        parts=[paper.WARNING, tables.quoted(evaluation)],
-        anchor="paper",
-        folded=True,
-    )
 
 
 def _figure_sections(evaluation: Evaluation) -> Iterator[Section]:
@@ -192,24 +184,6 @@ def _figure_sections(evaluation: Evaluation) -> Iterator[Section]:
                 "axes are logarithmic.",
             )
         )
-    if evaluation.frames:
-        yield _folded(
-            Figure(
-                title="Triplet accuracy against frames",
-                content=charts.frames(evaluation.frames),
-                caption="How often a clip lies nearer to one of its own simulation than to one of "
-                "another.",
-            )
-        )
-    if evaluation.layout is not None:
-        yield _folded(
-            Figure(
-                title=f"t-SNE of the embedding of {evaluation.layout.label}",
-                content=charts.t_sne(evaluation.layout),
-                caption=f"{len(evaluation.layout.wind):,} of {evaluation.layout.clips:,} clips. "
-                "Distances between clusters and their sizes mean nothing.",
-            )
-        )
 
 
 def _folded(figure: Figure) -> Section:
@@ -224,9 +198,6 @@ def markdown(evaluation: Evaluation) -> str:
     parts += [
         _text(tables.models(evaluation)),
         score_table.LEGEND,
-        "## What the paper printed",
-        paper.WARNING,
-        _text(tables.quoted(evaluation)),
     ]
     for title, made in (
         (
@@ -234,9 +205,7 @@ def markdown(evaluation: Evaluation) -> str:
             tables.differences(evaluation),
         ),
         ("## Every target", tables.targets(evaluation)),
-        ("## Linear readout of the embedding", tables.linear(evaluation)),
         ("## Learning curve", tables.learning(evaluation)),
-        ("## Triplet accuracy against frames", tables.frames(evaluation)),
     ):
         if made is not None:
             parts += [title, _text(made)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flagdata.answer.answer import Cell, Table
-from models.evaluation import paper, score_table
+from models.evaluation import score_table
 from models.evaluation.evaluation import Evaluation
 
 _METRICS = {
@@ -27,25 +27,6 @@ def models(evaluation: Evaluation) -> Table:
         columns=[column.heading for column in score_table.COLUMNS],
         rows=[[column.cell(row) for column in score_table.COLUMNS] for row in evaluation.rows],
         caption=score_table.LEGEND,
-    )
-
-
-def quoted(evaluation: Evaluation) -> Table:
-    """Lists what the paper printed of its models."""
-    del evaluation
-    return Table(
-        columns=("model, quoted", "input", "RMSE", "bound", "Acc@0.5", ""),
-        rows=[
-            (
-                row.model,
-                row.input_size,
-                f"{row.rmse:.3f}",
-                f"≥ {row.bound:.3f}",
-                f"{row.accuracy:.3f}",
-                "breaks the bound" if row.breaks_bound else "",
-            )
-            for row in paper.FLAGSIM
-        ],
     )
 
 
@@ -90,20 +71,6 @@ def targets(evaluation: Evaluation) -> Table:
     )
 
 
-def linear(evaluation: Evaluation) -> Table | None:
-    """Lists what a linear model reads out of the embeddings."""
-    if not evaluation.reads:
-        return None
-    return Table(
-        columns=("model", "data", "components", "quantity", "Pearson r"),
-        rows=[
-            (read.label, read.data, str(read.readout.components), target, score_table.cell(r, 3))
-            for read in evaluation.reads
-            for target, r in read.pearson.items()
-        ],
-    )
-
-
 def learning(evaluation: Evaluation) -> Table | None:
     """Lists the points of the learning curve."""
     if not evaluation.learning:
@@ -114,15 +81,3 @@ def learning(evaluation: Evaluation) -> Table | None:
             (p.label, f"{p.sequences:,}", score_table.cell(p.score, 3)) for p in evaluation.learning
         ],
     )
-
-
-def frames(evaluation: Evaluation) -> Table | None:
-    """Lists the triplet accuracy by the frames that a model sees, and the paper's."""
-    if not evaluation.frames:
-        return None
-    ours = [(p.label, str(p.frames), score_table.cell(p.score, 3)) for p in evaluation.frames]
-    quotes = [
-        ("SDN, quoted from the paper", str(size), f"{accuracy:.3f}")
-        for size, accuracy in paper.TRIPLETS
-    ]
-    return Table(columns=("model", "frames", "triplet accuracy"), rows=[*ours, *quotes])

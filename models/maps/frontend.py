@@ -42,6 +42,7 @@ from torch.nn import functional
 from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError, LimitError
 from models.maps import flow
+from models.maps.handmade import FEATURES, features
 from models.maps.pixel_course import (
     at_rest,
     band_powers,
@@ -50,7 +51,6 @@ from models.maps.pixel_course import (
     log_power,
     shares_of_nyquist,
 )
-from models.regression.handmade import FEATURES, features
 
 _BLOCK = 32
 _FRAMES = 5  # at a time: 1 MB of 224 × 224 px each, of which a core's cache holds two

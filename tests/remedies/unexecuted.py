@@ -83,7 +83,6 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("models/training/checkpoint.py", "name another folder by -"),
         ("models/training/train_command.py", "wait until it has ended,"),
         ("models/training/training_recipe.py", "build it first: flagdata build"),
-        ("models/evaluation/evaluate_command.py", "name one, such as wave o"),
     ),
     "an error that is caught: the message which is printed in its place says --start": (
         ("flagdata/ingest/camera/recording_start.py", "give --start"),

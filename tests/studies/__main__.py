@@ -28,6 +28,10 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
                 "tests.studies.series_errors:main",
                 "Measure how a series of windows errs, for a card.",
             ),
+            "yardsticks": (
+                "tests.studies.yardsticks.command:yardsticks",
+                "Judge networks beside a paper's yardsticks.",
+            ),
             "validate": (
                 "tests.studies.validation",
                 "Run all slow evidence, one study after another.",

@@ -11,9 +11,9 @@ from measure.gate import DISTORTIONS, ClipStatistics, Gate
 from measure.gate.checks import CHECKS
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
+from models.maps.handmade import FEATURES
 from models.networks.learner import Learner, Loss
 from models.networks.networks_by_name import NETWORKS
-from models.regression.handmade import FEATURES
 from models.trained.estimator import Estimator
 from models.trained.outliers import Familiarity
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.answer import Quantity, Span
 from models.evaluation import Predictions
 from models.evaluation.bootstrap import LEVEL, ScoreEstimate
+from models.evaluation.curves import LearningPoint
+from models.evaluation.evaluation import Evaluation, evaluate
 
 
 def generator(seed: int) -> np.random.Generator:
@@ -68,4 +72,44 @@ def posterior(
         parameters=10,
         milliseconds=1.5,
         note="",
+    )
+
+
+GROUP = np.repeat(np.arange(30), 4)
+WIND = np.repeat(np.linspace(0, 10, 30), 4)
+
+
+def run(label: str, scale: float, seed: int, *, group: np.ndarray = GROUP) -> Predictions:
+    error = scale * generator(seed).normal(size=120)
+    return of_wind(WIND, WIND + error, group=group, label=label, embedding=WIND[:, None])
+
+
+def ours(seed: int) -> Predictions:
+    made = posterior(clips=120, draws=20, wide=1, shift=0, targets=2, seed=seed)
+    truth = np.column_stack(
+        [WIND, made.truth[:, 1] * 0 + np.repeat(np.linspace(0.05, 0.15, 30), 4)]
+    )
+    mean = truth + [0.1, 0.01] * generator(seed).normal(size=(120, 2))
+    samples = mean[:, None] + [0.1, 0.01] * generator(seed + 1).normal(size=(120, 20, 2))
+    return dataclasses.replace(
+        made,
+        label="ours <&>",
+        truth=truth,
+        mean=mean,
+        samples=samples.astype(np.float32),
+        group=GROUP,
+    )
+
+
+def compared() -> Evaluation:
+    """Three models, one of two runs, and a learning curve."""
+    return evaluate(
+        [run("SDN", 0.3, 1), ours(3), run("SDN", 0.5, 2), run("ResNet-18", 1.5, 4)],
+        data="made@v1",
+        seed=0,
+        draws=100,
+        learning=[
+            LearningPoint(label="SDN", sequences=n, score=score(9 / n, 8 / n, 10 / n))
+            for n in (10, 20)
+        ],
     )

@@ -10,7 +10,7 @@ from scipy import stats
 
 from flagdata.core.json_values import json_values
 from flagdata.errors import InputError
-from models.evaluation import SCORES, Resamples, estimate, paper
+from models.evaluation import SCORES, Resamples, estimate
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.scores import error_against, rmse_bound
 from tests.models.evaluation.made import generator, of_wind
@@ -52,20 +52,6 @@ def test_no_errors_break_the_bound_and_errors_just_beyond_half_a_metre_per_secon
         )
     extreme = np.array([0.0, 0.0, 0.0, 0.5 + 1e-9])
     assert SCORES["rmse"](np.zeros(4), extreme) == pytest.approx(rmse_bound(0.75), rel=1e-8)
-
-
-def test_four_rows_of_the_papers_table_break_the_bound() -> None:
-    """By hand: 0.5 √0.42 = 0.324, 0.5 √0.225 = 0.237, 0.5 √0.187 = 0.216, 0.5 √0.162 = 0.201, all
-    above the RMSE."""
-    broken = [
-        (row.model, row.rmse, round(row.bound, 3)) for row in paper.FLAGSIM if row.breaks_bound
-    ]
-    assert broken == [
-        ("Cardona et al.", 0.271, 0.324),
-        ("ResNet-18", 0.207, 0.237),
-        ("SDN", 0.183, 0.216),
-        ("SDN", 0.180, 0.201),
-    ]
 
 
 def test_an_accuracy_that_is_no_share_is_refused() -> None:

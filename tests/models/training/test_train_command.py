@@ -51,6 +51,7 @@ from models.training.stated_films import StatedFilms
 from models.training.training_recipe import TRAININGS
 from tests.small import TRAINING
 from tests.studies import shipping
+from tests.studies.yardsticks.command import yardsticks
 
 
 def run(*arguments: str) -> dict[str, Any]:
@@ -354,26 +355,14 @@ def test_a_clip_of_another_rate_is_shown_at_the_networks_instants(lake: Path) ->
         films.check_judged(replace(slow, frames=12, rate=32.0), recipe.cropping, model="fast")
 
 
-def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_embeddings(
+def test_yardsticks_score_triplets_of_other_lengths_and_read_the_cloth_from_embeddings(
     lake: Path, tmp_path: Path
 ) -> None:
-    found = run(
-        "evaluate",
-        "small",
-        "--dataset",
-        "made",
-        "--at",
-        "main",
-        "--lake",
-        str(lake),
-        "--out",
-        str(tmp_path),
-        "--frames",
-        "8",
-        "--frames",
-        "12",
-        "--linear",
-    )
+    of_lake = ("small", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path), "--json")
+    beside = ("--at", "main", "--frames", "8", "--frames", "12", "--linear")
+    command = yardsticks.command
+    done = CliRunner().invoke(command, [*of_lake, *beside], catch_exceptions=False)
+    found = json.loads(done.stdout)
     assert [(point["label"], point["frames"]) for point in found["frames"]] == [
         ("small", 8),
         ("small", 12),
@@ -386,20 +375,9 @@ def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_em
     assert "## Linear readout of the embedding" in text
 
 
-def test_clips_longer_than_the_films_are_refused(lake: Path, tmp_path: Path) -> None:
-    longer = [
-        "evaluate",
-        "small",
-        "--dataset",
-        "made",
-        "--lake",
-        str(lake),
-        "--out",
-        str(tmp_path),
-        "--frames",
-        "90",
-    ]
-    done = CliRunner().invoke(root, longer)
+def test_yardsticks_of_clips_longer_than_the_films_are_refused(lake: Path, tmp_path: Path) -> None:
+    longer = ("small", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path))
+    done = CliRunner().invoke(yardsticks.command, [*longer, "--frames", "90"])
     assert isinstance(done.exception, InputError)
     assert "film has 14 frames" in str(done.exception)
 

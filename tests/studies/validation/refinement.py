@@ -50,7 +50,6 @@ from measure.refine.evaluator import STAGES
 from measure.refine.refine_command import RENDERS, scenes_of, space_of
 from measure.refine.space import DIMENSION
 from measure.refine.target import as_stated, of_recording
-from models.evaluation.feature_baselines import TARGETS, Fitted, fit_baselines
 from models.trained import estimator as models
 from models.trained.estimator import Estimator
 from models.training import DataSpec, FitFilm
@@ -68,6 +67,7 @@ from tests.studies.validation.transfer import (
     reference_clips,
     unseen,
 )
+from tests.studies.yardsticks.feature_baselines import TARGETS, Fitted, fit_baselines
 
 _OF = {
     "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras unknown to it",

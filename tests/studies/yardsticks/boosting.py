@@ -15,7 +15,7 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 
 from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.errors import InputError
-from models.regression.ridge import require_table
+from tests.studies.yardsticks.ridge import require_table
 
 LEVELS = (0.025, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.975)
 """Levels of the quantiles: the ends of central intervals of 95, 90, 80 and 50 %, and the median."""

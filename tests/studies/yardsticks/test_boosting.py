@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from flagdata.errors import InputError
-from models.regression.boosting import Boosting, fit_boosting
+from tests.studies.yardsticks.boosting import Boosting, fit_boosting
 
 LEVELS = (0.1, 0.5, 0.9)
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from models.regression.handmade import BAND_EDGES, FEATURES, features
+from models.maps.handmade import BAND_EDGES, FEATURES, features
 
 RATE = 25.0
 T, SIDE = 30, 112

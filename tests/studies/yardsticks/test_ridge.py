@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models.regression.ridge import PENALTIES, Ridge, fit_ridge
+from tests.studies.yardsticks.ridge import PENALTIES, Ridge, fit_ridge
 
 
 def table(seed: int, n: int, noise: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -19,11 +19,11 @@ from models.evaluation.predict import DRAWS, milliseconds, timed_clips
 from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
+from models.maps.handmade import FEATURES, features
 from models.networks.targets import stated_targets
-from models.regression.boosting import ENSEMBLES, Boosting, fit_boosting
-from models.regression.handmade import FEATURES, features
-from models.regression.ridge import Ridge, check_folds, fit_ridge
 from models.training.inputs import Prepared, film_rows, prepare_clips, prepare_films, simulations
+from tests.studies.yardsticks.boosting import ENSEMBLES, Boosting, fit_boosting
+from tests.studies.yardsticks.ridge import Ridge, check_folds, fit_ridge
 
 TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 _FRONT_END = FrontEnd(maps="handmade")

@@ -9,9 +9,9 @@ import pytest
 
 from flagdata.errors import InputError, UsageError
 from flagdata.pages.chart_drawing import svg
-from models.evaluation import evaluation_charts
-from models.evaluation.tsne import layout
 from tests.models.evaluation.made import generator, of_wind
+from tests.studies.yardsticks.sections import draw_tsne
+from tests.studies.yardsticks.tsne import layout
 
 
 def test_clusters_stay_apart_each_clip_keeps_its_wind_and_one_seed_gives_one_picture() -> None:
@@ -24,7 +24,7 @@ def test_clusters_stay_apart_each_clip_keeps_its_wind_and_one_seed_gives_one_pic
     distance = np.linalg.norm(found.places[:, None] - found.places[None], axis=2) + 1e9 * np.eye(45)
     np.testing.assert_array_equal(found.wind[distance.argmin(axis=1)], found.wind)
     np.testing.assert_array_equal(layout(made, seed=1, perplexity=12, most=45).places, found.places)
-    assert svg(evaluation_charts.t_sne(found), name="plane").startswith("<svg ")
+    assert svg(draw_tsne(found), name="plane").startswith("<svg ")
     with pytest.raises(InputError, match="60 clips do not admit a perplexity of 60"):
         layout(made, seed=1, perplexity=60)
 

@@ -4,17 +4,17 @@ model reads."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
+from flagdata.errors import InputError
 from models.evaluation import triplets
-from models.evaluation.bootstrap import Resamples, estimate
-from models.evaluation.curves import FramesPoint
-from models.evaluation.evaluation import Read
-from models.evaluation.linear import bouman
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
+from models.evaluation.curves import check_point
 from models.evaluation.predict import embed_entries
 from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
@@ -22,9 +22,47 @@ from models.maps.frontend import FrontEnd
 from models.networks.targets import truth
 from models.trained.estimator import Estimator
 from models.training.inputs import Prepared
+from tests.studies.yardsticks.linear import Readout, bouman
 
 Films = Callable[[FrontEnd, Cropping], Prepared]
 """A front end and how films are cut → one clip of each film of the side that is judged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FramesPoint:
+    """Triplet accuracy of a model that sees so many frames."""
+
+    JSON_NAMES: ClassVar = ("label", "frames", "accuracy=score.value", "interval=score.interval")
+
+    label: str
+    frames: int
+    score: ScoreEstimate
+
+    def __post_init__(self) -> None:
+        where = f"triplet accuracy of {self.label!r} against frames"
+        check_point(where, self.frames, "frames", self.score)
+        if self.score.value > 1:
+            raise InputError(
+                f"the triplet accuracy is {self.score.value:g}, above 1",
+                where=where,
+                fix="give a share, not per cent",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Read:
+    """The linear readout of a model's embedding on some data set."""
+
+    JSON_NAMES: ClassVar = ("label", "data", "components=readout.components", "pearson")
+
+    label: str
+    data: str
+    readout: Readout
+
+    @property
+    def pearson(self) -> dict[str, ScoreEstimate]:
+        """Returns Pearson's r of each target."""
+        return dict(zip(self.readout.targets, self.readout.pearson, strict=True))
 
 
 def triplet_accuracies(

@@ -1,1 +1,0 @@
-"""Estimates without a network: hand-made features, ridge regression, boosting."""
