@@ -203,7 +203,7 @@ class Desk:
         return judged
 
     def evaluation(self, judged: Judged, *, side: str, reference: str | None) -> Evaluation:
-        """Scores what was said of the clips of a side."""
+        """Scores the predictions for the clips of a side."""
         from models.evaluation.evaluation import evaluate as scored
 
         return scored(
