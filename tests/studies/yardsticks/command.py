@@ -22,13 +22,13 @@ from flagdata.dataset import Pairs
 from flagdata.dataset.lake_source import open_source
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.verbs.verb_options import Result, option, options, verb
-from models.evaluation import evaluation_report
+from models.evaluation import Predictions, evaluation_report
 from models.evaluation.evaluate_command import Desk
-from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
 from models.trained.estimator import Estimator
-from models.training.inputs import Prepared, film_rows, prepare_films
+from models.training import Prepared, prepare_films
+from models.training.inputs import film_rows
 from tests.studies.yardsticks.feature_baselines import check_stated, predictions
 from tests.studies.yardsticks.readouts import (
     Films,

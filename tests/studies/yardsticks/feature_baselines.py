@@ -13,15 +13,16 @@ from torch import Tensor
 
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import child_seed
-from flagdata.dataset.pairs import Pairs
+from flagdata.dataset import Pairs
 from flagdata.errors import InputError
+from models.evaluation import Predictions
 from models.evaluation.predict import DRAWS, milliseconds, timed_clips
-from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
 from models.maps.handmade import FEATURES, features
 from models.networks.targets import stated_targets
-from models.training.inputs import Prepared, film_rows, prepare_clips, prepare_films, simulations
+from models.training import Prepared, prepare_clips, prepare_films
+from models.training.inputs import film_rows, simulations
 from tests.studies.yardsticks.boosting import ENSEMBLES, Boosting, fit_boosting
 from tests.studies.yardsticks.ridge import Ridge, check_folds, fit_ridge
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
-from models.evaluation.scores import SCORES
+from models.evaluation import SCORES, Resamples, estimate
+from models.evaluation.bootstrap import ScoreEstimate
 
 COMPONENTS = 50
 """Principal components the paper keeps."""

@@ -12,16 +12,15 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from models.evaluation import triplets
-from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
+from models.evaluation import Predictions, Resamples, estimate, triplets
+from models.evaluation.bootstrap import ScoreEstimate
 from models.evaluation.curves import check_point
 from models.evaluation.predict import embed_entries
-from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
 from models.networks.targets import truth
 from models.trained.estimator import Estimator
-from models.training.inputs import Prepared
+from models.training import Prepared
 from tests.studies.yardsticks.linear import Readout, bouman
 
 Films = Callable[[FrontEnd, Cropping], Prepared]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flagdata.answer.answer import Answer, Figure, Section, Table
+from flagdata.answer import Answer, Figure, Section, Table
 from flagdata.answer.charts import Axis, Chart, Cloud, Colour, Line, Panel
 from flagdata.answer.markdown import table as markdown_table
 from flagdata.core.json_values import json_values

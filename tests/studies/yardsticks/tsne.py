@@ -15,7 +15,8 @@ import numpy as np
 from flagdata.core import rng
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
-from models.evaluation.predictions import WIND, Predictions
+from models.evaluation import Predictions
+from models.evaluation.predictions import WIND
 
 PERPLEXITY = 30.0
 CLIPS = 2000
