@@ -69,7 +69,7 @@ def stage_bars() -> Stage:
             bars[stage] = tqdm(
                 total=total,
                 desc=printable(stage),
-                unit="part",
+                bar_format="{desc}: {percentage:3.0f} %|{bar}| {elapsed}<{remaining}",
                 ncols=100,
                 mininterval=interval,
                 file=sys.stderr,

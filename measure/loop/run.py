@@ -188,7 +188,7 @@ def solve(
     nulls = null_plan.first_round(options)
     setting, fits, bank, reference = test_against(nulls)
     evidence = fits.whitened.evidence(fits.whitened.statistics)
-    while (wanted := _nulls_wanted(options, nulls, reference, evidence)) is not None:
+    while (wanted := _nulls_wanted(options, nulls, reference, evidence, report)) is not None:
         setting, fits, bank, reference = test_against(nulls := wanted)
         evidence = fits.whitened.evidence(fits.whitened.statistics)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
@@ -212,7 +212,7 @@ def solve(
 
 
 def _nulls_wanted(
-    options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence
+    options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence, stage: Stage
 ) -> int | None:
     """Returns how many nulls to go on with after so many; None where those decide, or are given as
     a bank."""
@@ -220,7 +220,13 @@ def _nulls_wanted(
         return None
     statistic = reference.tested(evidence, names())
     return null_plan.more_nulls(
-        nulls, options.nulls, options.most_nulls, reference.test, statistic, level=options.level
+        nulls,
+        options.nulls,
+        options.most_nulls,
+        reference.test,
+        statistic,
+        level=options.level,
+        stage=stage,
     )
 
 

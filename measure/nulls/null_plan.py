@@ -21,6 +21,8 @@ from measure.nulls.reference import NullBank
 from measure.verdict.criteria import CRITERIA
 
 _CARRIED = ", carried along the recordings' own ways from other instants on"
+_FIRST_LOOK = 8
+"""Kinds by which a verdict reports a first p; they decide nothing."""
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
 """So many at least are simulated: each kind of numerics is a batch, and p-values count the
 kinds."""
@@ -91,8 +93,8 @@ def bank_for(
 
 
 def first_round(options: NullOptions) -> int:
-    """Nulls with which a verdict begins: they can test the level."""
-    return min(max(CRITERIA.first_kinds, kinds_needed(options.level)) * banks.WINDS, options.nulls)
+    """Nulls with which a verdict begins, for a first answer that decides nothing."""
+    return min(_FIRST_LOOK * banks.WINDS, options.nulls)
 
 
 def more_nulls(
@@ -103,9 +105,13 @@ def more_nulls(
     statistic: float,
     *,
     level: float,
+    stage: Stage,
 ) -> int | None:
-    """Returns twice as many nulls where so many leave open what the test decides; None where they
-    decide it.
+    """Reports p by so many nulls; returns how many are needed where these leave open what the test
+    decides, None where they decide it.
+
+    The first that can end the test are `Criteria.first_kinds` kinds, or as many as the level needs;
+    then twice as many each time.
 
     Below `wanted` that is where the interval of p is not wholly above the level: the base model is
     only ever rejected by that many or more, and p of so many is valid whether fewer would have
@@ -113,6 +119,10 @@ def more_nulls(
     level and its interval includes the level.
     """
     p, (low, high) = conformal.p(statistic), conformal.interval(statistic, level=CRITERIA.interval)
+    stage(f"p = {p:.2g} by {nulls // banks.WINDS} of {wanted // banks.WINDS} kinds", 1, 1)
+    first = min(max(CRITERIA.first_kinds, kinds_needed(level)) * banks.WINDS, wanted)
+    if nulls < first:
+        return first
     if nulls < wanted:
         return min(2 * nulls, wanted) if low <= level else None
     borderline = level / CRITERIA.near <= p <= CRITERIA.near * level and low <= level <= high

@@ -163,11 +163,23 @@ def test_more_are_simulated_where_p_is_near_the_level(as_far: int, wanted: int |
     conformal = GroupedConformal(
         null=np.where(np.arange(40) < as_far, 9.0, 1.0), kinds=np.arange(40)
     )
-    assert null_plan.more_nulls(160, 160, 400, conformal, 5.0, level=0.05) == wanted
-    assert null_plan.more_nulls(160, 160, 200, conformal, 5.0, level=0.05) == (
-        None if wanted is None else 200
-    )
-    assert null_plan.more_nulls(320, 320, 320, conformal, 5.0, level=0.05) is None
+    said: list[str] = []
+
+    def more(nulls: int, enough: int, most: int) -> int | None:
+        return null_plan.more_nulls(
+            nulls,
+            enough,
+            most,
+            conformal,
+            5.0,
+            level=0.05,
+            stage=lambda what, *_: said.append(what),
+        )
+
+    assert more(160, 160, 400) == wanted
+    assert more(160, 160, 200) == (None if wanted is None else 200)
+    assert more(320, 320, 320) is None
+    assert said[0] == f"p = {(1 + as_far) / 41:.2g} by 40 of 40 kinds"
 
 
 @pytest.mark.parametrize(("as_far", "wanted"), [(0, 160), (3, 160), (4, None), (20, None)])
@@ -179,9 +191,15 @@ def test_twenty_kinds_end_the_simulation_only_where_they_do_not_reject(
     conformal = GroupedConformal(
         null=np.where(np.arange(20) < as_far, 9.0, 1.0), kinds=np.arange(20)
     )
-    assert null_plan.first_round(null_plan.NullOptions()) == 80
-    assert null_plan.first_round(null_plan.NullOptions(level=0.01, nulls=400)) == 4 * 99
-    assert null_plan.more_nulls(80, 160, 400, conformal, 5.0, level=0.05) == wanted
-    assert null_plan.more_nulls(80, 100, 400, conformal, 5.0, level=0.05) == (
-        None if wanted is None else 100
-    )
+
+    def more(nulls: int, enough: int, most: int, level: float = 0.05) -> int | None:
+        return null_plan.more_nulls(
+            nulls, enough, most, conformal, 5.0, level=level, stage=lambda *_: None
+        )
+
+    assert more(80, 160, 400) == wanted
+    assert more(80, 100, 400) == (None if wanted is None else 100)
+    # Eight kinds report a first p and decide nothing, however large it is.
+    assert null_plan.first_round(null_plan.NullOptions()) == 32
+    assert more(32, 160, 400) == 80
+    assert more(32, 400, 400, 0.01) == 4 * 99
