@@ -22,14 +22,14 @@ from flagdata.core.rng import child_seed, stream
 from measure.cloth.blown_wind import WIND_RATE, Log, blown
 from measure.cloth.flag_prior import TABLES
 from measure.forecasting.regressors import EffectColumn
-from measure.nulls.null_simulation import irregular
+from measure.nulls.null_meshes import remesh
 from measure.observables import OBSERVABLES, Observable, View, seen_from
 from measure.observables.observable import WINDOW
 from measure.observables.tracked_cloth import edges_of
 from sim.cloth import handles as held
 from sim.cloth.handles import Handles
 from sim.cloth.material import Material, named_material
-from sim.cloth.mesh import Diagonals, Mesh, grid
+from sim.cloth.mesh import Mesh, grid
 from sim.cloth.scene import Scene, assemble, roughen_start
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -84,18 +84,8 @@ class Discretisation:
 
     def mesh(self, fit: Mesh) -> Mesh:
         """Makes this kind's mesh of the cloth of the fit's one."""
-        low, (width, height) = fit.rest.min(axis=0), np.ptp(fit.rest, axis=0).tolist()
-        spacing = math.sqrt(width * height / fit.vertex_count) / self.finer
-        flat = grid(
-            width=width,
-            height=height,
-            columns=max(2, round(width / spacing)),
-            rows=max(2, round(height / spacing)),
-            diagonals=list(Diagonals)[self.diagonals],
-        )
-        if self.uneven is not None:
-            flat = irregular(flat, spacing, stream(self.uneven, "discretisation", "mesh"))
-        return replace(flat, rest=flat.rest + low)
+        uneven = None if self.uneven is None else stream(self.uneven, "discretisation", "mesh")
+        return remesh(fit, finer=self.finer, diagonals=self.diagonals, uneven=uneven)
 
     def content(self) -> dict[str, float | int | None]:
         """Returns JSON values."""

@@ -13,13 +13,13 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 import torch
-from scipy.spatial import Delaunay
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.provenance import array_hash
 from flagdata.core.rng import stream
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import Calibration
+from measure.nulls.null_meshes import remesh
 from measure.nulls.stiffness import StiffnessFactors
 from measure.trajectories.attachment_anchors import carry_attachments
 from measure.trajectories.interpolation import onto
@@ -32,7 +32,7 @@ from measure.trajectories.trajectory import (
 )
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
-from sim.cloth.mesh import Diagonals, Mesh, grid
+from sim.cloth.mesh import Mesh
 from sim.cloth.scene import Scene, assemble
 from sim.cloth.system import System
 from sim.effects import Effect, apply
@@ -51,7 +51,6 @@ _LEVEL = 1e-6  # of the cloth's size: attachments that lie less apart along u ar
 _SAMPLED = 0.05  # s, of winds that blow
 CARRIED = 0.01
 """Between samples of the ways of attachments [s]."""
-_UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
 _HALVINGS = 3  # of the step of a run that diverges
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
 
@@ -155,29 +154,15 @@ class NullBatch:
         )
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
-        """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments:
-        a grid, or in half of the draws one whose inner vertices are moved and joined anew
-        (Delaunay), as other codes' meshes are."""
+        """Makes a finer mesh in the fit's frame, irregular in half of the draws, and finds its
+        vertices nearest to the attachments."""
         rng = stream(self.seed, "null", "mesh")
-        rest = self.specimen.mesh.rest
-        low, size = rest.min(axis=0), np.ptp(rest, axis=0)
-        spacing = math.sqrt(size[0] * size[1] / self.specimen.mesh.vertex_count) / rng.uniform(
-            *_FINER
-        )
-        columns, rows = (max(2, round(extent / spacing)) for extent in size)
-        diagonals = list(Diagonals)[rng.integers(2)]
-        flat = grid(
-            width=float(size[0]),
-            height=float(size[1]),
-            columns=columns,
-            rows=rows,
-            diagonals=diagonals,
-        )
-        if rng.random() < 0.5:
-            flat = irregular(flat, spacing, rng)
-        flat = replace(flat, rest=flat.rest + low)
+        fit = self.specimen.mesh
+        finer, diagonals = rng.uniform(*_FINER), int(rng.integers(2))
+        uneven = rng if rng.random() < 0.5 else None
+        flat = remesh(fit, finer=finer, diagonals=diagonals, uneven=uneven)
         nearest = (
-            int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1)))
+            int(np.argmin(np.linalg.norm(flat.rest - fit.rest[vertex], axis=1)))
             for vertex in self.specimen.held
         )
         return flat, tuple(nearest)
@@ -326,19 +311,3 @@ def _hung(rest: FloatArray, seats: FloatArray, anchors: FloatArray) -> FloatArra
     offset = rest - seats[lowest]
     turned = [math.cos(angle) * offset[:, 0], math.sin(angle) * offset[:, 0], offset[:, 1]]
     return anchors[lowest] + np.stack(turned, axis=1)
-
-
-def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
-    """Moves a grid's vertices, those inside by up to `_UNEVEN` of the spacing [m] along each axis,
-    and joins them anew."""
-    low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
-    inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
-    rest = flat.rest + np.where(
-        inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0
-    )
-    faces = np.asarray(Delaunay(rest).simplices, dtype=np.int64)
-    (a, b), (c, d) = (rest[faces[:, k]].T - rest[faces[:, 0]].T for k in (1, 2))
-    doubled = a * d - b * c
-    faces[doubled < 0] = faces[doubled < 0][:, ::-1]
-    # Vertices along an edge lie on a line but for rounding, which may join three of them.
-    return Mesh(rest=rest, faces=faces[np.abs(doubled) > spacing**2 * np.finfo(np.float32).eps])

@@ -45,6 +45,7 @@ METHOD = {
     "nulls/stiffness": {"_STRETCHING", "_APART"},
     "nulls/directions": {"APPEARS", "NOTHING"},
     "nulls/reference": {"_GROUPS"},
+    "nulls/null_meshes": {"_UNEVEN"},
     "nulls/null_simulation": {
         "SETTLE",
         "_FINER",
@@ -52,7 +53,6 @@ METHOD = {
         "_SAMPLED",
         "CARRIED",
         "_LEVEL",
-        "_UNEVEN",
         "_HALVINGS",
         "_GENTLE",
     },
