@@ -46,6 +46,7 @@ METHOD = {
     "nulls/directions": {"APPEARS", "NOTHING"},
     "nulls/reference": {"_GROUPS"},
     "nulls/null_meshes": {"_UNEVEN"},
+    "nulls/null_plan": {"_FIRST_LOOK"},
     "nulls/null_simulation": {
         "SETTLE",
         "_FINER",
