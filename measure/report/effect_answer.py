@@ -138,7 +138,7 @@ def _facts(name: str, shown: Mapping[str, str], alike: list[str]) -> dict[str, s
     kinds = [" or ".join(shown)] if len({*shown.values()}) == 1 else shown
     facts = {f"from {kind}": text for kind, text in zip(kinds, shown.values(), strict=False)}
     if alike:
-        facts["hardly told from"] = f"{', '.join(alike)} ({CLASSES[effect.effect_class]})"
+        facts["hardly separated from"] = f"{', '.join(alike)} ({CLASSES[effect.effect_class]})"
     if (copied := effect.copied) is not None:
         facts["done as well by"] = f"{copied.by}; shown by {copied.shown_by} ({copied.how})"
     if (package := EFFECTS.package(name)) is not None:

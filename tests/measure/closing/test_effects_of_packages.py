@@ -12,10 +12,11 @@ import pytest
 
 from measure.closing import close_loop
 from measure.cloth import Flag, solve, verdict_of, weighable
-from measure.forecasting import Calibration, Suspicion, library, on_films, on_markers
+from measure.forecasting import Calibration, Suspicion, library, on_films, on_markers, regressors
 from measure.loop import LoopOptions
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks
+from measure.report.effect_answer import answer_effect
 from measure.trajectories import Experiment, Specimen
 from measure.verdict import Conclusion
 from sim.effects import EFFECTS, Effect
@@ -57,7 +58,8 @@ class Profile(Fan):
 
     needs = {Need.MAST: "the profile is no other way to be known"}
 '''
-KINDS, LEVEL, DURATION, NOISE = 6, 0.15, 4.6, 5e-4
+KINDS, DURATION, NOISE = 9, 4.6, 5e-4
+BESIDE = {"lift", "air-density", "tangential-linear-drag", "full-hoist", "direction-change"}
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +91,21 @@ def test_it_is_a_candidate_of_both_kinds_of_verdict_at_the_strengths_of_its_prio
         assert (own.low, own.high, own.signs, own.column.step) == (-10.0, 10.0, (1, -1), 1.0)
         assert not [one for one in candidates if one.column.effect == "profile"]
         assert Suspicion.parse("fan+", candidates).name == "fan.acceleration"
+    described = answer_effect("fan").document
+    assert described["package"] == "package fans"
+    assert described["parameters"]["acceleration"]["meaning"] == "b."
+    assert set(described["recordings"].values()) == {"weighed"}
+    of_a_mast = answer_effect("profile").document["recordings"].values()
+    assert all(text.startswith("not weighed: it needs a mast") for text in of_a_mast)
 
 
 def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
-    fan: type[Effect], specimen: Specimen, tmp_path: Path
+    fan: type[Effect], specimen: Specimen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Six kinds of numerics, the fewest that can test a level of 0.15."""
+    """Nine kinds of numerics, the fewest that can test a level of 0.1; of flagdata's own effects
+    five, since each costs a simulation of all nulls."""
+    kept = [c for c in regressors.registered_columns() if c.effect in {*BESIDE, "fan"}]
+    monkeypatch.setattr(regressors, "registered_columns", lambda: kept)
     alike = {
         "markers": specimen.mesh.rest,
         "rate": 25.0,
@@ -115,7 +126,7 @@ def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
         effects=(fan(acceleration=6.0),),  # pyright: ignore[reportCallIssue]
     )
     experiment = Experiment(specimen=specimen, recordings=tuple(blown.simulate()))
-    found = close_loop(experiment, LoopOptions(bank=tmp_path, level=LEVEL))
+    found = close_loop(experiment, LoopOptions(bank=tmp_path, level=0.1))
     assert (found.conclusion, found.named) == (Conclusion.EFFECT, ("fan",))
     (named,) = (one for one in found.ranking if not one.why_not)
     assert named.strength.low < 6.0 < named.strength.high
