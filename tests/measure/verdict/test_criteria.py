@@ -29,7 +29,6 @@ METHOD = {
     },
     "forecasting/model": {"_SHARE"},
     "forecasting/observer": {"WIDEST", "_JOINT"},
-    "forecasting/recorded": {"_WEIGHT", "_DIRECTION"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
     "forecasting/recorded": {"STATED_WEIGHT", "_DIRECTION"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
