@@ -23,7 +23,12 @@ FILES`."""
 RENAMED = {r"((?:cloth|place)\.\w+)\.determined$": r"\1.constrained"}
 """Pattern of a path in a kept document → its path today. Items of a list are numbered:
 `windows.0.wind`."""
-NEW = (r"(?:cloth|place)\.\w+\.given$", r"\b(?:unweighed|copied)(?:\.|$)")
+NEW = (
+    r"(?:cloth|place)\.\w+\.given$",
+    r"\b(?:unweighed|copied)(?:\.|$)",
+    r"test\.(?:directed|course|course_share)$",
+    r"provenance\.criteria\.(?:course_share|passing|alike_scores)$",
+)
 """Patterns of paths that kept documents lack."""
 _OF_A_RUN = {"seconds", "code", "code_version", "created", "version", "milliseconds"}
 """Keys of what another run has otherwise."""

@@ -33,9 +33,8 @@ GLOSSARY: dict[str, str] = {
     "control": "The next-best effect instead of the named one. It should predict worse.",
     "nat": "The unit of a natural logarithm of a likelihood ratio; 3 nat are odds of 20 to 1.",
     "Bayes factor": "How much more probable the observations are with an effect than without it.",
-    "z": "The strength of an effect in standard errors. On films it is how far the recordings lie "
-    "along the change "
-    "that the effect makes, in standard deviations of null flags.",
+    "z": "How far the recordings lie along the change that an effect makes, in standard deviations "
+    "of nulls.",
     "power": "The chance that the test rejects the base model if an effect of its expected "
     "strength acts.",
     "family-wise p": "p of an effect compared with the largest of all effects in each null, "

@@ -13,7 +13,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.inference.growth import power
     from measure.inference.random_effect import NullModel, Nulls
-    from measure.inference.segment_evidence import CoefficientFit, Evidence, best_gain, gains
+    from measure.inference.segment_evidence import CoefficientFit, Evidence, gains
     from measure.inference.whitened_misfit import WhitenedMisfit
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.core.arrays import FloatArray
-from measure.inference.segment_evidence import Chosen, Evidence, left_together
+from measure.inference.segment_evidence import Evidence, left_together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,13 +27,12 @@ class Fluctuation:
     likelihood: float
 
 
-def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuation:
-    """Estimates how much a column's coefficient fluctuates, beside the nuisances and some columns
-    more.
+def fluctuation(evidence: Evidence, column: int) -> Fluctuation:
+    """Estimates how much a column's coefficient fluctuates, beside the nuisances.
 
     Errors are taken to be as large as this set's are across the column.
     """
-    fit = evidence.fit([column, *(further for further in along if further != column)])
+    fit = evidence.fit([column])
     active = list(fit.active)
     score = evidence.score[:, column] - evidence.curvature[:, column][:, active] @ fit.value
     curvature = np.maximum(evidence.curvature[:, column, column], np.finfo(np.float64).tiny)

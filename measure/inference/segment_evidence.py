@@ -46,6 +46,8 @@ class Evidence(StatisticRows):
         settled: (segment, quantity) what its recording settles at less what the model does; None
             where not looked at.
         prior: of the calibrated parameters, see `NullModel`.
+        statistics, speeds: that it is of, and the wind's (segment,) [m/s]; None of evidence across
+            a column.
     """
 
     _WHOLE: ClassVar = frozenset({"columns", "logged", "prior"})
@@ -61,6 +63,8 @@ class Evidence(StatisticRows):
     course: Course | None = None
     settled: FloatArray | None = None
     prior: FloatArray = field(default_factory=PRIOR.copy)
+    statistics: Statistics | None = None
+    speeds: FloatArray | None = None
 
     @classmethod
     def of(
@@ -119,6 +123,8 @@ class Evidence(StatisticRows):
             course=statistics.course,
             settled=statistics.settled,
             prior=null.prior,
+            statistics=statistics,
+            speeds=speeds,
         )
 
     @property
@@ -227,42 +233,6 @@ class Evidence(StatisticRows):
         pulls[active] = 0.0
         return pulls[: self.columns]
 
-    def moved(self, column: int, coefficient: float) -> Evidence:
-        """Computes what the evidence would be if a column acted with a coefficient as well: r and
-        moments move by their response."""
-        along = self.curvature[:, :, column]
-        return replace(
-            self,
-            score=self.score + coefficient * along,
-            energy=self.energy
-            + 2 * coefficient * self.score[:, column]
-            + coefficient**2 * along[:, column],
-            turning=None if self.turning is None else self.turning.moved(column, coefficient),
-        )
-
-    def with_one_more(
-        self, active: Chosen, columns: Chosen
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Computes how a fit of some columns moves with one more, for each of others: (column,) its
-        coefficients, (all, column) how all coefficients go with it, (all,) those of the fit
-        without."""
-        curvature, score, _ = self._total()
-        chosen, candidates = list(active), list(columns)
-        across = curvature[np.ix_(chosen, candidates)]
-        solved = np.linalg.solve(curvature[np.ix_(chosen, chosen)], np.c_[across, score[chosen]])
-        moved, fitted = np.zeros((len(score), len(candidates))), np.zeros(len(score))
-        moved[chosen], moved[candidates, range(len(candidates))], fitted[chosen] = (
-            -solved[:, :-1],
-            1.0,
-            solved[:, -1],
-        )
-        total = np.diag(curvature)[candidates]
-        information = total - np.einsum("ai,ai->i", across, solved[:, :-1])
-        step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(
-            information, np.maximum(1e-9 * total, _TINY)
-        )
-        return step, moved, fitted
-
     def left_out(self, outside: BoolArray, chosen: Chosen = ()) -> FloatArray:
         """Computes half misfits of some segments, when the nuisances and chosen columns are fitted
         to the others, (segment,)."""
@@ -322,22 +292,3 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> FloatArray:
             fit = inside.fit(chosen)
             result[row, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
-
-
-def best_gain(evidence: Evidence, along: Chosen = (), *, without: Chosen = ()) -> float:
-    """Computes the largest held-out gain that one more column brings, over that of some columns
-    alone: see `gains`.
-
-    Args:
-        without: columns whose gains do not count.
-    """
-    folds, active = left_together(evidence.recording), [*evidence.nuisance, *along]
-    columns = [column for column in range(evidence.columns) if column not in (*active, *without)]
-    total = np.zeros(len(columns))
-    for index in np.unique(folds):
-        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
-        step, moved, fitted = inside.with_one_more(active, columns)
-        curvature = outside.curvature.sum(axis=0)
-        slope = (outside.score.sum(axis=0) - curvature @ fitted) @ moved
-        total += step * slope - step**2 * np.einsum("pc,pq,qc->c", moved, curvature, moved) / 2
-    return float(total.max())

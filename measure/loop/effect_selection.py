@@ -1,10 +1,12 @@
 """Which effect it is: models of the library compared by what they predict on recordings they were
 not fitted to.
 
-Detection is by the calibrated statistic. Attribution is one rule. Models whose held-out scores do
-not differ significantly from the best are the confidence set (after Hansen, Lunde and Nason,
-Econometrica 79:453, 2011), and of these the ones that pass their own predictive test are the
-verdict. The base model and forces that are none of the library compete like any other.
+Detection is by the directed test, and so is the order of the effects. Attribution is one rule.
+Models whose held-out scores do not differ significantly from the best are the confidence set (after
+Hansen, Lunde and Nason, Econometrica 79:453, 2011). Of these, recordings do not separate those
+whose directed scores are within one deviation of the largest. The verdict is those of them with
+which, free, the same test points at no other effect. The base model and forces that are none of the
+library compete like any other.
 """
 
 from __future__ import annotations
@@ -25,14 +27,15 @@ from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, wind_turn
 from measure.loop.strength_estimates import (
     estimate,
     heterogeneity,
+    heterogeneous,
     strength,
     strengths_by_recording,
 )
 from measure.loop.validation import total_error
-from measure.loop.weighed_effects import Weighed, lag_behind, rank_candidates
-from measure.nulls.directions import Move
+from measure.loop.weighed_effects import Weighed, best_by_gain, lag_behind, rank_candidates
+from measure.nulls.directed_test import Sought
 from measure.nulls.null_groups import GUSTS
-from measure.nulls.reference import Reference
+from measure.nulls.reference import BaseModelTest, Reference
 from measure.probes.lines import SpectralLine
 from measure.probes.wind_course import ALONG, Variation
 from measure.verdict.criteria import CRITERIA
@@ -62,11 +65,11 @@ class LibraryJudgement:
         ranking: candidates, best first, each with the reason why it was not named.
         confident: columns of the models of the library in the confidence set, best first; empty
             where the base model or none of the library is as good as they are.
-        statistic, p_value: of the global test.
-        line: of the errors' spectra that the first of the ranking leaves, where it alone would
-            reject the model.
-        course: how the wind varies, by the errors that the first leaves, where that alone would and
-            it is not turbulence.
+        test: of the base model.
+        line: of the errors' spectra that the first of the ranking leaves, where nulls hardly have
+            such a one.
+        course: how the wind varies, by the errors that the first leaves, where it does not so in
+            nulls and it is not turbulence.
         direction: by how much the wind is turned from where its logs have it, counter-clockwise
             [rad]; None in still air.
         departed: columns of what the recordings show of the set-up against what was declared.
@@ -79,13 +82,12 @@ class LibraryJudgement:
     named: tuple[int, ...]
     ranking: tuple[Weighed, ...]
     confident: tuple[int, ...]
-    statistic: float
-    p_value: float
+    test: BaseModelTest
     line: SpectralLine | None = None
     course: Variation | None = None
     direction: Estimate | None = None
     departed: tuple[int, ...] = ()
-    power: tuple[tuple[Move, float], ...] = ()
+    power: tuple[tuple[Sought, float], ...] = ()
     open: tuple[str, ...] = ()
 
 
@@ -107,9 +109,8 @@ def judge(
             says.
     """
     refitted = refits or {}
-    statistics = reference.statistics(evidence, names())
-    statistic = reference.tested(evidence, names())
-    p_value, power = reference.test.p(statistic), reference.power(level)
+    tested, statistics = reference.test(evidence), reference.statistics(evidence)
+    p_value, power = tested.p, reference.power(tested, level)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     # Nothing is known along an effect that the cloth cannot have as it is held.
     effects = [(i, c) for i, c in effects if evidence.curvature[:, i, i].sum() > 0]
@@ -118,10 +119,11 @@ def judge(
         _weigh(
             evidence,
             reference,
+            tested,
             column,
             effect,
             linear,
-            statistics,
+            float(statistics[column]),
             refitted.get(column),
             lost=refitted.get(column, 0) is None,
         )
@@ -135,9 +137,7 @@ def judge(
             _within(w, direction, declared.tolerance) if w.column == turned_column else w
             for w in candidates
         ]
-    ranking = rank_candidates(
-        [*candidates, _gusts(evidence, reference, float(statistics[len(names())]))]
-    )
+    ranking = rank_candidates([*candidates, _gusts(evidence, reference, tested)])
     departing = {
         names().index(name)
         for name, declared_otherwise in ((TURNED, beyond), (HOIST, declared.attached))
@@ -159,7 +159,8 @@ def judge(
             replace(
                 w,
                 candidate=replace(
-                    w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)
+                    w.candidate,
+                    why_not=_reason(best_by_gain(ranking), w, why) * (w.column not in taken),
                 ),
             )
             for w in ranking
@@ -169,9 +170,8 @@ def judge(
             named=tuple(w.column for w in accepted),
             ranking=tuple(reasoned),
             confident=tuple(w.column for w in confident),
-            statistic=statistic,
-            p_value=p_value,
-            line=_swinging(remaining, reference, level),
+            test=tested,
+            line=reference.line(remaining, level),
             course=_blown(remaining, reference, level),
             direction=direction,
             departed=tuple(w.column for w in departed),
@@ -179,10 +179,11 @@ def judge(
             open=reasons,
         )
 
-    if not reference.test.tests(level):
+    if not reference.tests(level):
         return judgement(
             Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model"
         )
+    least = reference.passing(CRITERIA.passing)
     if departed:
         rest = (
             "the recordings show that the set-up is another than the declared one, and nothing "
@@ -190,19 +191,14 @@ def judge(
         )
         columns_shown = [w.column for w in departed]
         if len(departed) == 1 and first is not None:
-            explained = first.leftover > level
+            explained = first.leftover > least
         else:
-            explained = reference.p_left_by(remaining, names(), columns_shown) > level
+            explained = reference.p_beside(remaining, columns_shown) > least
         if explained:
             return judgement(Conclusion.EFFECT, departed, rest)
-        second = (
-            _second(remaining, reference, departed[0], ranking, level)
-            if len(departed) == 1
-            else None
-        )
-        if second is not None:
-            return judgement(Conclusion.EFFECT, (*departed, second))
-        return judgement(Conclusion.PARTLY, departed)
+        if len(departed) > 1:
+            return judgement(Conclusion.PARTLY, departed)
+        return judgement(*_beside(remaining, reference, departed[0], ranking, level))
     if p_value > level:
         why, shares = "the base model is not rejected", [share for _, share in power]
         reasons = undecided_sentences(
@@ -211,26 +207,39 @@ def judge(
         return judgement(
             Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons
         )
-    if reference.suspected is not None and not confident:
-        confident = [w for w in ranking if w.column == reference.suspected[0] and w.admissible]
-    passing = [w for w in confident if w.passes(level)]
+    if reference.suspected is not None:
+        column = reference.suspected[0]
+        alike = [w for w in confident or ranking if w.column == column and w.admissible]
+    else:
+        alike = _alike(confident, tested, level)
+    passing = [w for w in alike if w.passes(least, level)]
     if passing:
         return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
-    second = _second(remaining, reference, confident[0], ranking, level) if confident else None
-    if second is not None:
-        return judgement(Conclusion.EFFECT, (confident[0], second))
+    conclusion, accepted = (
+        _beside(remaining, reference, alike[0], ranking, level)
+        if alike
+        else (Conclusion.OUTSIDE, [])
+    )
+    if conclusion is Conclusion.EFFECT:
+        return judgement(conclusion, accepted)
     pulsating = _pulsating(remaining, reference, ranking, level)
-    if pulsating is not None and (pulsating.candidate.leftover > level or not confident):
+    if pulsating is not None and (pulsating.candidate.leftover > least or not alike):
         ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
         return judgement(
-            Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY,
+            Conclusion.EFFECT if pulsating.candidate.leftover > least else Conclusion.PARTLY,
             [pulsating],
         )
-    return (
-        judgement(Conclusion.PARTLY, confident[:1])
-        if confident
-        else judgement(Conclusion.OUTSIDE, ())
-    )
+    return judgement(conclusion, accepted)
+
+
+def _alike(confident: Sequence[Weighed], tested: BaseModelTest, level: float) -> list[Weighed]:
+    """Selects those of the confidence set whose scores recordings do not separate from the
+    largest, that first; none where that is no larger than nulls' at a level, and something else
+    rejects the base model."""
+    ordered = sorted(confident, key=lambda w: -w.score)
+    if not ordered or tested.null.p(ordered[0].score) > level:
+        return []
+    return [w for w in ordered if w.score >= ordered[0].score - CRITERIA.alike_scores]
 
 
 def _departure(evidence: Evidence, reference: Reference) -> float:
@@ -301,32 +310,26 @@ def _leads(first: FloatArray, second: FloatArray, recording: IntArray) -> bool:
     return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
 
 
-def _swinging(evidence: Evidence, reference: Reference, level: float) -> SpectralLine | None:
-    """Finds the line of the spectra of what is left, where it alone would reject a model."""
-    line = reference.line(evidence)
-    return line if line is not None and reference.conformal.p(line.far) <= level else None
-
-
 def _varying(evidence: Evidence) -> Variation | None:
     """Estimates from the errors how the wind varies. None where its course is not asked for."""
     return None if evidence.course is None else evidence.course.variation(evidence.recording)
 
 
 def _blown(evidence: Evidence, reference: Reference, level: float) -> Variation | None:
-    """Estimates how the wind varies by the remaining errors, where that alone would reject a model
-    and is not turbulence."""
-    swing, variation = reference.swing(evidence), _varying(evidence)
-    if swing is None or variation is None or variation.turbulent:
+    """Estimates how the wind varies by the remaining errors, where it does not so in all but a
+    share `level` of nulls and it is not turbulence."""
+    p, variation = reference.p_of_course(evidence), _varying(evidence)
+    if p is None or variation is None or variation.turbulent:
         return None
-    return variation if reference.conformal.p(swing) <= level else None
+    return variation if p <= level else None
 
 
 def _pulsating(
     evidence: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
-    """Finds gusts by the course of a wind that varies along itself alone, where that alone would
-    reject a model: what varies within segments is not found by how the pressure differs between
-    them. None where the wind does not vary so."""
+    """Finds gusts by the course of a wind that varies along itself alone, as it does not in nulls:
+    what varies within segments is not found by how the pressure differs between them. None where
+    the wind does not vary so."""
     variation = _blown(evidence, reference, level)
     if variation is None or not variation.alone:
         return None
@@ -358,53 +361,62 @@ def _intensity(evidence: Evidence) -> float:
 
 
 def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
-    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest
-    statistics."""
+    """Columns that are refitted: the first by directed scores and by held-out gains, and those of
+    the confidence set that recordings do not separate from its first."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
-    strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
-    first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
-    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in first), *judgement.confident])
+    by_gain = sorted(able, key=lambda w: -w.gains.sum())
+    first = (*able[: CRITERIA.refitted], *by_gain[: CRITERIA.refitted])
+    confident = [w for w in judgement.ranking if w.column in judgement.confident]
+    most = max((w.score for w in confident), default=0.0)
+    alike = [w for w in confident if w.score >= most - CRITERIA.alike_scores]
+    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in (*first, *alike))])
     return tuple(column for column in chosen if column != GUST_COLUMN)
 
 
-def _second(
+def _beside(
     evidence: Evidence,
     reference: Reference,
     first: Weighed,
     ranking: Sequence[Weighed],
     level: float,
-) -> Weighed | None:
-    """Finds an effect with which the first passes its predictive test, and predicts better than
-    alone. Beside gusts, the pressure is free in every segment.
+) -> tuple[Conclusion, list[Weighed]]:
+    """Concludes what an effect that does not pass its predictive test explains: with another to
+    which that points, both, if the pair predicts better than the first alone and passes; a part, if
+    it predicts better and does not pass, or the strength differs between recordings. Where no pair
+    predicts better, what remains is no effect of the library, and the first is named alone.
+
+    Beside gusts, the pressure is free in every segment.
 
     Args:
         evidence: of what the first leaves, if it was refitted.
     """
-    pressure = names().index(GUSTS)
-    fitted = [first.column]
-    if first.column == GUST_COLUMN:
-        evidence, reference, fitted = evidence.freed(pressure), reference.beside(), []
-    skipped = {GUST_COLUMN, first.column, *([] if fitted else [pressure])}
-    candidates = [w for w in ranking if w.column not in skipped]
-    pairs = gains(evidence, [fitted, *([*fitted, w.column] for w in candidates)])
-    for index in np.argsort(-pairs[1:].sum(axis=1)):
-        second, pair = candidates[index], [*fitted, candidates[index].column]
-        if not _leads(pairs[1 + index], pairs[0], evidence.recording):
-            return None
-        value, _ = evidence.fit(pair).of(second.column)
+    pressure, gusty = names().index(GUSTS), first.column == GUST_COLUMN
+    fitted, least = ([] if gusty else [first.column]), reference.passing(CRITERIA.passing)
+    pointed = reference.pointed_at(evidence, fitted, least)
+    beside = evidence.freed(pressure) if gusty else evidence
+    leads = False
+    for column in pointed:
+        second = next((w for w in ranking if w.column == column), None)
+        if second is None or (gusty and column == pressure):
+            continue
+        pair = [*fitted, column]
+        alone, both = gains(beside, [fitted, pair])
+        if not _leads(both, alone, evidence.recording):
+            continue
+        leads = True
+        value, _ = beside.fit(pair).of(column)
         described = EFFECTS[second.candidate.effect].parameters()[second.candidate.parameter]
         constant = all(
-            _homogeneous_beside(evidence, pair, w, level)
-            for w in (first, second)
-            if w.column in pair
+            _homogeneous_beside(beside, pair, w, level) for w in (first, second) if w.column in pair
         )
         if (
             described.admits(described.null + value)
             and constant
-            and reference.p_left_by(evidence, names(), pair) > level
+            and reference.p_beside(evidence, pair) > least
         ):
-            return second
-    return None
+            return Conclusion.EFFECT, [first, second]
+    whole = not leads and not heterogeneous(first.candidate, level)
+    return Conclusion.EFFECT if whole else Conclusion.PARTLY, [first]
 
 
 def _homogeneous_beside(
@@ -434,10 +446,11 @@ def _larger(evidence: Evidence, candidate: Weighed) -> float:
 def _weigh(
     evidence: Evidence,
     reference: Reference,
+    tested: BaseModelTest,
     column: int,
     effect: EffectColumn,
     linear: FloatArray,
-    statistics: FloatArray,
+    share: float,
     refitted: Refit | None,
     *,
     lost: bool,
@@ -445,13 +458,12 @@ def _weigh(
     fit = evidence.fit([column])
     value, _ = fit.of(column)
     # The standard error is that which makes the nulls' mean squared z 1.
-    statistic = float(statistics[column])
-    error = abs(value) / math.sqrt(max(statistic, 1e-12))
-    z = value / error if error > 0 else 0.0
+    error = abs(value) / math.sqrt(max(share, 1e-12))
     gained, leftover = (
         linear,
-        refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column]),
+        refitted.leftover if refitted else reference.p_beside(evidence, [column]),
     )
+    score, alone = tested.score(effect.name), tested.alone(effect.name)
     remaining, null = evidence, effect.described.null
     if refitted is not None:
         gained, value, remaining = refitted.gains, refitted.coefficient, refitted.evidence
@@ -474,6 +486,7 @@ def _weigh(
     return Weighed(
         column=column,
         error=error,
+        score=score,
         gains=gained,
         recording=evidence.recording,
         admissible=effect.described.admits(null + value) and not lost,
@@ -482,9 +495,9 @@ def _weigh(
             parameter=effect.parameter,
             null=null,
             strength=bounded or strength(null, value, error, effect.unit),
-            z=z,
-            p_value=reference.p_alone(statistic, column),
-            p_family=reference.p_family(statistic, column),
+            z=score,
+            p_value=alone,
+            p_family=tested.null.p(score),
             gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording),
             behind=0.0,
@@ -495,9 +508,10 @@ def _weigh(
     )
 
 
-def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
+def _gusts(evidence: Evidence, reference: Reference, tested: BaseModelTest) -> Weighed:
     """Weighs gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by
-    twice their intensity."""
+    twice their intensity; their score is that of the wind's course."""
+    score, alone = tested.course, reference.p_of_course(evidence)
     pressure = names().index(GUSTS)
     gusts, gained = fluctuation(evidence, pressure), fluctuation_gains(evidence, pressure)
     described = EFFECTS["gusts"].parameters()["intensity"]
@@ -511,6 +525,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
         )
     return Weighed(
         column=GUST_COLUMN,
+        score=-math.inf if score is None else score,
         gains=gained,
         recording=evidence.recording,
         error=gusts.error / 2,
@@ -521,13 +536,13 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
             parameter="intensity",
             null=described.null,
             strength=strength(described.null, gusts.deviation / 2, gusts.error / 2, described.unit),
-            z=math.sqrt(statistic),
-            p_value=reference.p_alone(statistic, len(names())),
-            p_family=reference.p_family(statistic, len(names())),
+            z=math.nan if score is None else score,
+            p_value=math.nan if alone is None else alone,
+            p_family=1.0 if score is None else tested.null.p(score),
             gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording),
             behind=0.0,
-            leftover=reference.beside().p_left_by(evidence.freed(pressure), names(), ()),
+            leftover=reference.p_beside(evidence, ()),
             by_recording=tuple(by_recording),
         ),
     )
@@ -552,6 +567,6 @@ def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
             "unseen recordings"
         )
     return (
-        "the errors that remain are larger than those of nulls, or a force outside the library "
-        "predicts better"
+        "the recordings go farther the way of another effect, another effect acts beside it, or a "
+        "force outside the library predicts better"
     )

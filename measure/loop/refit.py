@@ -28,7 +28,7 @@ from flagdata.core.arrays import BoolArray, FloatArray
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import EffectColumn, columns, names
+from measure.forecasting.regressors import EffectColumn, columns
 from measure.forecasting.segments import Segments
 from measure.inference.segment_evidence import Evidence, left_together
 from measure.inference.whitened_misfit import WhitenedMisfit
@@ -260,7 +260,7 @@ class Refit:
     Attributes:
         coefficient: fitted to all recordings.
         gains: (segment,) held-out gain: see `inference.gains`.
-        leftover: p-value of the global test on what it leaves.
+        leftover: p of the test along all other effects on what it leaves.
         evidence: of what it leaves.
         profile: of the misfit across its strengths; None where it was not looked at.
     """
@@ -303,7 +303,7 @@ def refit(
         return Refit(
             coefficient=fitted.model.effects[0][1],
             gains=gains,
-            leftover=reference.p_left_by(evidence, names(), [column]),
+            leftover=reference.p_beside(evidence, [column]),
             evidence=evidence,
             profile=profile_strength(fits.forecaster, fits.segments, fits.whitened, fitted.model),
         )

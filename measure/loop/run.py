@@ -125,8 +125,8 @@ class LoopOutcome:
         field: modes of the corrective field; empty where the library has the whole answer.
         whole: whether the field stands for all that the base model lacks, and not for what a larger
             model leaves.
-        line: of the errors' spectra that remains beside the field.
-        course: of the wind that remains beside the field, and is not turbulence.
+        line: of the errors' spectra that remains beside what is named.
+        course: of the wind that remains beside it, and is not turbulence.
     """
 
     verdict: Verdict
@@ -157,11 +157,8 @@ def solve(
     setting = Setting.of(experiment, workers=options.workers)
     report("sensitivities", 0, 1)
     measured, projection = _looked_at(setting)
-    late = (
-        (0.0,) * len(setting.speeds)
-        if measured.course is None
-        else lags(measured.course, setting.segments)
-    )
+    course = measured.course
+    late = (0.0,) * len(setting.speeds) if course is None else lags(course, setting.segments)
     if any(late):
         setting = setting.moved(late)
         measured, projection = _looked_at(setting)
@@ -218,15 +215,9 @@ def _nulls_wanted(
     a bank."""
     if options.bank is not None:
         return None
-    statistic = reference.tested(evidence, names())
+    tested, most = reference.test(evidence), options.most_nulls
     return null_plan.more_nulls(
-        nulls,
-        options.nulls,
-        options.most_nulls,
-        reference.test,
-        statistic,
-        level=options.level,
-        stage=stage,
+        nulls, options.nulls, most, tested.null, tested.statistic, level=options.level, stage=stage
     )
 
 
@@ -477,6 +468,7 @@ def _outcome(
         },
     )
     beyond = judgement.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
+    rejected = judgement.conclusion not in NOT_REJECTED
     field = _field(solved) if beyond else ()
     fitted = solved.base if larger is None else larger
     return LoopOutcome(
@@ -486,8 +478,8 @@ def _outcome(
         at_bounds=fitted.model.calibration.at_bounds,
         field=field,
         whole=larger is None,
-        line=judgement.line if beyond else None,
-        course=judgement.course if beyond else None,
+        line=judgement.line if rejected else None,
+        course=judgement.course if rejected and GUST_COLUMN not in judgement.named else None,
     )
 
 
@@ -511,27 +503,29 @@ def _direction(judgement: LibraryJudgement) -> tuple[Parameter, ...]:
 def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
     """Reports the global test of the base model, and whether other nulls could decide it
     otherwise."""
-    conformal, judgement = solved.reference.test, solved.judgement
-    low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
-    undecided = low <= options.level <= high and conformal.tests(options.level)
+    tested, level = solved.judgement.test, options.level
+    conformal = tested.null
+    low, high = conformal.interval(tested.statistic, level=CRITERIA.interval)
+    undecided = low <= level <= high and conformal.tests(level)
     kinds_settling = (
-        conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval)
+        conformal.settling(tested.statistic, at=level, level=CRITERIA.interval)
         if undecided
         else None
     )
     return NullTest(
-        statistic=judgement.statistic,
+        statistic=tested.statistic,
         null=[float(v) for v in conformal.null],
         kinds=conformal.count,
-        p_value=Estimate(
-            value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval
-        ),
-        level=options.level,
-        critical=conformal.critical(options.level),
+        p_value=Estimate(value=tested.p, low=low, high=high, unit="1", level=CRITERIA.interval),
+        level=level,
+        critical=conformal.critical(level),
         nulls=bank.words,
         open=undecided,
         settling=kinds_settling,
         suspected="" if options.suspected is None else options.suspected.words,
+        directed=tested.scores.farthest,
+        course=tested.course,
+        course_share=None if tested.course is None else CRITERIA.course_share,
     )
 
 
@@ -540,13 +534,13 @@ def _power(judgement: LibraryJudgement) -> tuple[Power, ...]:
     by_name = {column.name: column for column in columns() if isinstance(column, EffectColumn)}
     return tuple(
         Power(
-            effect=by_name[move.name].effect,
-            parameter=by_name[move.name].parameter,
-            strength=move.strength,
-            unit=by_name[move.name].unit,
+            effect=by_name[sought.name].effect,
+            parameter=by_name[sought.name].parameter,
+            strength=sought.expected,
+            unit=by_name[sought.name].unit,
             share=share,
         )
-        for move, share in sorted(judgement.power, key=lambda entry: -entry[1])
+        for sought, share in sorted(judgement.power, key=lambda entry: -entry[1])
     )
 
 

@@ -35,9 +35,7 @@ def wind_turn(evidence: Evidence, reference: Reference) -> Estimate | None:
     if not undirected.curvature[:, column, column].any():
         return None
     value, _ = undirected.fit([column]).of(column)
-    error = abs(value) / math.sqrt(
-        max(float(reference.statistics(undirected, names())[column]), 1e-12)
-    )
+    error = abs(value) / math.sqrt(max(float(reference.statistics(undirected)[column]), 1e-12))
     half = reference.reach_of(column) * error
     return Estimate(
         value=value, low=value - half, high=value + half, unit="rad", level=CRITERIA.interval

@@ -21,6 +21,8 @@ class Weighed:
         column: place among the evidence's columns.
         candidate: as reported.
         error: standard error of the strength.
+        score: how far the recordings go its way, see `measure.nulls.directed_test`; of gusts, how
+            far the wind's course swings; −∞ of what is not tested for.
         gains: (segment,) held-out gain.
         recording: (segment,) of each.
         admissible: whether the model exists: its strength is one that the effect may have, its
@@ -35,25 +37,32 @@ class Weighed:
     column: int
     candidate: Candidate
     error: float
+    score: float
     gains: FloatArray
     recording: IntArray
     admissible: bool
     unlike: str = ""
     measured: Estimate | None = None
 
-    def passes(self, level: float) -> bool:
-        """Returns whether the model passes its predictive test: what it leaves is what nulls leave,
-        and its strength is the same in all recordings."""
-        return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
+    def passes(self, least: float, level: float) -> bool:
+        """Returns whether the model passes its predictive test: no other effect acts beside it at p
+        of `least` or less, and its strength is the same in all recordings at a level."""
+        return self.candidate.leftover > least and not heterogeneous(self.candidate, level)
 
 
 def rank_candidates(candidates: Sequence[Weighed]) -> list[Weighed]:
-    """Ranks candidates by held-out gain, those first that are admissible."""
-    ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
+    """Ranks candidates by their directed scores, those first that are admissible, and notes how far
+    each lies behind the one that predicts best."""
+    best = best_by_gain(candidates)
     return [
-        replace(w, candidate=replace(w.candidate, behind=lag_behind(ordered[0], w)))
-        for w in ordered
+        replace(w, candidate=replace(w.candidate, behind=lag_behind(best, w)))
+        for w in sorted(candidates, key=lambda w: (-w.admissible, -w.score))
     ]
+
+
+def best_by_gain(candidates: Sequence[Weighed]) -> Weighed:
+    """Returns the candidate with the largest held-out gain, of the admissible ones if any is."""
+    return max(candidates, key=lambda w: (w.admissible, w.gains.sum()))
 
 
 def lag_behind(best: Weighed, compared: Weighed) -> float:

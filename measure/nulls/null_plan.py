@@ -138,6 +138,13 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
     """
     bank = banks.load(folder, words=f"of this design, from {folder.name}")
     check(bank, setting, where=str(folder))
+    kinds, needed = len(np.unique(bank.nulls.numerics)), kinds_needed(1 - CRITERIA.interval)
+    if kinds < needed:
+        raise InputError(
+            f"the nulls are of {kinds} kinds of numerics, which leave intervals without an end",
+            where=str(folder),
+            fix=f"build a bank of {needed} or more, or leave it out",
+        )
     return replace(bank, words=bank.words + _CARRIED) if bank.carried else bank
 
 

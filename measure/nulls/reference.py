@@ -4,8 +4,8 @@ model did not see."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,30 +14,28 @@ from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
 from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, Calibration
+from measure.forecasting.regressors import TURNED
 from measure.forecasting.setting import Design
+from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
-from measure.inference.segment_evidence import Evidence, best_gain
+from measure.inference.segment_evidence import Evidence
 from measure.nulls.conformal import GroupedConformal, kinds_needed
-from measure.nulls.directions import (
+from measure.nulls.directed_test import DirectedScores, DirectedTest, Sought, Summary, beside
+from measure.nulls.marker_summary import (
     APPEARS,
-    Move,
-    moves,
-    pull_along,
-    pulls_of,
-    standardise_pulls,
+    chance_of_markers,
+    sought_on_markers,
+    summarise_evidence,
 )
-from measure.nulls.null_groups import (
-    GUSTS,
-    NullGroups,
-    UsualStatistics,
-    uncounted_columns,
-    unscaled_drops,
-)
-from measure.nulls.tails import as_normal
+from measure.nulls.null_groups import NullGroups, shares_of_drops
 from measure.probes.lines import Lines, SpectralLine
 from measure.verdict.criteria import CRITERIA
 
 _GROUPS = 400
+_UNOBSERVABLE = 1e-6
+"""Mean share below which a column is unobservable: that of the columns that are always fitted."""
+_NARROWEST = 1e-6
+"""Standard deviation below which a statistic does not vary."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,140 +143,8 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
         """
-        plain: list[NullGroups] = []
-        beside_gusts: list[NullGroups] = []
-        groups: list[_Group] = []
-        for left_out in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
-            evidence = Evidence.of(
-                left_out.outside.statistics, left_out.outside.speeds, left_out.model.under(prior)
-            )
-            for chosen in {
-                tuple(sorted(group.tolist())): group for group in left_out.groups
-            }.values():
-                picked, first_segment = evidence.select(chosen), left_out.outside.select(chosen[:1])
-                plain.append(NullGroups.of(picked, self.columns, first_segment))
-                beside_gusts.append(
-                    NullGroups.of(
-                        picked.freed(self.columns.index(GUSTS)), self.columns, first_segment
-                    )
-                )
-            first = left_out.groups[0]
-            groups.append(
-                _Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1]))
-            )
-        with_gusts = Reference.of(NullGroups.joined(beside_gusts), noise)
-        return Reference.of(
-            NullGroups.joined(plain),
-            noise,
-            beside_gusts=with_gusts,
-            columns=self.columns,
-            groups=groups,
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Group:
-    """The evidence of one null group, by a null model without its kind, and one segment of it."""
-
-    evidence: Evidence
-    own: Nulls
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Reference:
-    """Null distributions.
-
-    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over
-    the mean share of nulls with about the same noise of the markers: 1 in the mean if nothing is
-    missing. Sets whose errors are larger all over are so no larger here, nor are those whose noise
-    alone moves a column. One more statistic stands for gusts: the likelihood ratio of a wind
-    pressure that fluctuates, over one that differs by a constant.
-
-    Some columns are near their mean in all nulls, others are far from it in some. The tests compare
-    how far from the nulls' mean each cube root is, in their standard deviations: that of a variable
-    like χ², of whatever freedom, is nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci.
-    17:684, 1931); one whose tail is heavier is brought to the normal deviate that is as rare (see
-    `tails`). With the columns they weigh what is left, the same of moments about the pole, and the
-    most prominent line of the errors' spectra, where these are looked at. What the calibrated
-    parameters and the directions of the numerics take in of an effect shows on winds that they were
-    not fitted to: so they weigh the best held-out gain as well. So they do how the wind's course
-    swings: a covariance, of which nulls have what chance and their numerics leave, on either side
-    of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
-    `growth`). What recordings settle at is far on either side as well. Evidence whose moments,
-    course or settled quantities are not to count goes without them.
-
-    What is usual of a null group is that of other kinds of numerics, as it is for data: by means
-    and deviations that it had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20
-    kinds; by other kinds 2 and 4 %).
-
-    Attributes:
-        scaled: (group, column) of `unscaled_drops`: columns, gusts, then moments.
-        spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 2 to 11) how far the cube root of each is from its mean in other
-            kinds' nulls as noisy, in standard deviations; after the columns that of what the base
-            model leaves, then the best held-out gain, swings, settled quantities and the line as
-            they are.
-        kinds: (group,) of numerics.
-        deviations: (group, theta) of the calibrated parameters from those that the nulls were
-            simulated with, in standard errors as Σ has them.
-        centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as
-            noisy as the data.
-        degrees: (column + 2 to 11,) of freedom of their tails, see `measure.nulls.tails`.
-        lines: of the nulls; None where spectra are not looked at.
-        powers: (part,) of the damping by which swings grow.
-        damping: of the data, the logarithm of its ratio to the nominal one.
-        pulled: (group, column, part) of `pulled`, standardised as `far` is.
-        pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy
-            as the data.
-        beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
-        columns: names of the columns; of one from a bank.
-        groups: one of each kind; of one from a bank.
-        usual: kind → what is usual in the other kinds' nulls.
-        suspected: column and sign of the effect that was suspected beforehand, along which alone is
-            tested; None to test along all.
-    """
-
-    scaled: FloatArray
-    spread: FloatArray
-    far: FloatArray
-    kinds: IntArray
-    deviations: FloatArray
-    centre: FloatArray
-    width: FloatArray
-    degrees: FloatArray
-    pulled: FloatArray
-    pull: FloatArray
-    pull_width: FloatArray
-    lines: Lines | None = None
-    powers: FloatArray = field(default_factory=lambda: np.zeros(0))
-    damping: float = 0.0
-    beside_gusts: Reference | None = None
-    columns: tuple[str, ...] = ()
-    groups: tuple[_Group, ...] = ()
-    usual: Mapping[int, UsualStatistics] = field(default_factory=dict)
-    suspected: tuple[int, int] | None = None
-
-    @classmethod
-    def of(
-        cls,
-        statistics: NullGroups,
-        noise: float,
-        *,
-        beside_gusts: Reference | None = None,
-        columns: tuple[str, ...] = (),
-        groups: Sequence[_Group] = (),
-    ) -> Reference:
-        """Makes the null distributions for data of some noise [m].
-
-        Args:
-            groups: one of each kind.
-
-        Raises:
-            InputError: no nulls of such noise.
-        """
-        kinds = statistics.kinds
-        similar = np.abs(statistics.noise - noise) <= CRITERIA.alike_noise
-        count, needed = len(np.unique(kinds[similar])), kinds_needed(1 - CRITERIA.interval)
+        similar = self.nulls.select(np.abs(self.nulls.noise - noise) <= CRITERIA.alike_noise)
+        count, needed = len(np.unique(similar.numerics)), CRITERIA.fewest_kinds
         if count < needed:
             raise InputError(
                 f"the nulls are of {count} kinds of numerics with markers as noisy as "
@@ -286,70 +152,259 @@ class Reference:
                 where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )
-        usual = UsualStatistics.of(statistics.select(similar))
-        scaled, distances = (
-            np.empty_like(statistics.shares),
-            np.empty((len(kinds), len(usual.centre))),
+        sought = sought_on_markers(self.columns)
+        places = [self.columns.index(one.name) for one in sought]
+        usual_speed = float(similar.speeds.mean())
+        groups: list[NullGroups] = []
+        first_groups: list[NullGroups] = []
+        kinds: list[Summary] = []
+        chance: list[FloatArray] = []
+        for left_out in left_out_groups(similar, similar, segments, seed=seed):
+            outside, model = left_out.outside, left_out.model.under(prior)
+            evidence = Evidence.of(outside.statistics, outside.speeds, model)
+            different = {tuple(sorted(group.tolist())): group for group in left_out.groups}
+            groups.extend(
+                NullGroups.of(evidence.select(chosen), outside.select(chosen[:1]))
+                for chosen in different.values()
+            )
+            chosen = left_out.groups[0]
+            first_groups.append(NullGroups.of(evidence.select(chosen), outside.select(chosen[:1])))
+            chance.append(chance_of_markers(outside.statistics))
+            kinds.append(
+                summarise_evidence(
+                    evidence.select(chosen),
+                    places,
+                    usual_speed=usual_speed,
+                    damping=float(outside.calibration[0, DAMPING]),
+                )
+            )
+        return Reference.of(
+            NullGroups.joined(groups),
+            first=NullGroups.joined(first_groups),
+            directed=DirectedTest.of(sought, kinds, chance),
+            columns=self.columns,
+            usual_speed=usual_speed,
         )
-        pulls, usual_of_kind = np.empty_like(statistics.pulls), dict[int, UsualStatistics]()
-        for kind in np.unique(kinds):
-            of_kind = kinds == kind
-            similar_noise = (
-                np.abs(statistics.noise - statistics.noise[of_kind][0]) <= CRITERIA.alike_noise
-            )
-            if (
-                len(np.unique(kinds[similar_noise & ~of_kind])) >= CRITERIA.fewest_kinds
-            ):  # else no others have such noise
-                similar_noise &= ~of_kind
-            usual_of_others = replace(
-                UsualStatistics.of(statistics.select(similar_noise)), degrees=usual.degrees
-            )
-            scaled[of_kind], distances[of_kind] = (
-                statistics.shares[of_kind] / usual_of_others.spread,
-                usual_of_others.far(statistics.select(of_kind)),
-            )
-            pulls[of_kind] = usual_of_others.pulled(statistics.pulls[of_kind])
-            usual_of_kind[int(kind)] = usual_of_others
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BaseModelTest:
+    """The base model, or what a model leaves, beside nulls.
+
+    Attributes:
+        scores: how far it goes the way of each effect.
+        course: how far the wind's course swings, on the scale of the largest score; None where it
+            is not looked at, or not tested.
+        statistic: the larger one, or the score along the effect that was suspected.
+        null: the same of each kind by all others.
+        courses: (kind,) of `course`; −∞ where it is None.
+    """
+
+    scores: DirectedScores
+    course: float | None
+    statistic: float
+    null: GroupedConformal
+    courses: FloatArray
+
+    @property
+    def p(self) -> float:
+        """(1 + number of kinds that are at least as far)/(1 + number of kinds)."""
+        return self.null.p(self.statistic)
+
+    def score(self, name: str) -> float:
+        """Returns how far it goes the way of an effect; −∞ of one that is not tested for."""
+        place = self._place(name)
+        return -math.inf if place is None else float(self.scores.largest[place])
+
+    def alone(self, name: str) -> float:
+        """Computes p along one effect alone, of either sign that it may have; 1 of one that is not
+        tested for."""
+        place = self._place(name)
+        if place is None:
+            return 1.0
+        null = self.scores.of_kinds_along(place)
+        counted = GroupedConformal(null=null, kinds=np.arange(len(null)))
+        return counted.p(float(self.scores.largest[place]))
+
+    def _place(self, name: str) -> int | None:
+        names = [one.name for one in self.scores.sought]
+        return names.index(name) if name in names else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reference:
+    """Null distributions.
+
+    The base model is tested by one statistic: the largest directed score (see
+    `measure.nulls.directed_test`), or how far the wind's course swings, which has a fifth of the
+    level, since gusts have no direction. The course of nulls is a covariance on either side of
+    nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
+    `growth`). A model with an effect is tested by the scores of all others, that effect free.
+
+    Everything else describes and decides nothing: lines of the errors' spectra, what recordings
+    settle at. A column's share, drop/(left − drop), over the mean share of nulls, 1 in the mean if
+    nothing is missing, gives strengths their errors.
+
+    Attributes:
+        scaled: (group, column) of `shares_of_drops` over their mean in other kinds.
+        spread: (column,) their mean.
+        kinds: (group,) of numerics.
+        deviations: (group, theta) of the calibrated parameters from those that the nulls were
+            simulated with, in standard errors as Σ has them.
+        directed: the test along the effects, by one group of each kind.
+        swings: (kind, part) of the wind's course in the same groups; of no part where it is not
+            looked at.
+        dampings: (kind,) logarithm of their ratio to the nominal one.
+        settled: (group, quantity) what recordings settle at.
+        lines, standing_out: of the nulls, and how far each group stands out; None where spectra are
+            not looked at.
+        columns: names of the columns.
+        usual_speed: of the nulls' winds [m/s].
+        damping: of the data, the logarithm of its ratio to the nominal one.
+        suspected: column and sign of the effect that was suspected beforehand, along which alone is
+            tested; None to test along all.
+    """
+
+    scaled: FloatArray
+    spread: FloatArray
+    kinds: IntArray
+    deviations: FloatArray
+    directed: DirectedTest
+    swings: FloatArray
+    dampings: FloatArray
+    settled: FloatArray
+    lines: Lines | None
+    standing_out: FloatArray | None
+    columns: tuple[str, ...]
+    usual_speed: float
+    damping: float = 0.0
+    suspected: tuple[int, int] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        groups: NullGroups,
+        *,
+        first: NullGroups,
+        directed: DirectedTest,
+        columns: tuple[str, ...],
+        usual_speed: float,
+    ) -> Reference:
+        """Makes the null distributions.
+
+        Args:
+            groups: of all kinds.
+            first: one of each kind.
+        """
+        scaled = np.empty_like(groups.shares)
+        for kind in np.unique(groups.kinds):
+            own = groups.kinds == kind
+            scaled[own] = groups.shares[own] / _spread(groups.shares[~own])
+        lines = None if groups.lines is None else Lines.of(groups.lines)
         return cls(
             scaled=scaled,
-            spread=usual.spread,
-            far=distances,
-            kinds=kinds,
-            deviations=statistics.deviations,
-            centre=usual.centre,
-            width=usual.width,
-            degrees=usual.degrees,
-            pulled=pulls,
-            pull=usual.pull,
-            pull_width=usual.pull_width,
-            lines=usual.lines,
-            powers=usual.powers,
-            beside_gusts=beside_gusts,
+            spread=_spread(groups.shares),
+            kinds=groups.kinds,
+            deviations=groups.deviations,
+            directed=directed,
+            swings=first.swings,
+            dampings=first.damping,
+            settled=groups.settled,
+            lines=lines,
+            standing_out=None
+            if lines is None or groups.lines is None
+            else lines.standing_out(groups.lines),
             columns=columns,
-            groups=tuple(groups),
-            usual=usual_of_kind,
+            usual_speed=usual_speed,
         )
 
     def at(self, calibration: Calibration) -> Reference:
         """Returns the null distributions for data whose statistics are taken at a calibration."""
         return replace(self, damping=calibration.steps_from(Calibration())[DAMPING])
 
-    def beside(self) -> Reference:
-        """Returns the null distributions of evidence with a pressure that is free in every segment.
+    def along(self, column: int, sign: int) -> Reference:
+        """Returns the null distributions that test along one effect alone, which was suspected
+        beforehand."""
+        return replace(self, suspected=(column, sign))
 
-        Raises:
-            UsageError: this is it.
-        """
-        if self.beside_gusts is None:
-            raise UsageError(
-                "it is beside gusts itself", where="reference", fix="ask that of the bank"
-            )
-        return self.beside_gusts
+    @property
+    def count(self) -> int:
+        """How many kinds there are."""
+        return len(self.directed.kinds)
 
-    @cached_property
-    def conformal(self) -> GroupedConformal:
-        """The global test: how far the farthest is of all columns, what is left and the line."""
-        return GroupedConformal(null=self.far.max(axis=1), kinds=self.kinds)
+    def tests(self, level: float) -> bool:
+        """Returns whether so many kinds can reject at a level."""
+        return self.count >= kinds_needed(level)
+
+    def test(self, evidence: Evidence) -> BaseModelTest:
+        """Tests the base model by data: along all effects and by the wind's course, or along the
+        effect that is suspected."""
+        scores, course = self._scores(evidence), self._course(evidence)
+        statistic, null = scores.farthest, scores.of_kinds
+        courses, value = np.full(len(null), -math.inf), None
+        if self.suspected is not None:
+            column, sign = self.suspected
+            statistic, null = scores.along(self._place(column), sign)
+        elif course is not None:
+            courses, value = beside(null, course.null, course.value, share=CRITERIA.course_share)
+            statistic, null = max(statistic, value), np.maximum(null, courses)
+        return BaseModelTest(
+            scores=scores,
+            course=value,
+            statistic=statistic,
+            null=self._counted(null),
+            courses=courses,
+        )
+
+    def p_beside(self, evidence: Evidence, chosen: Sequence[int]) -> float:
+        """Computes p of the test along all other effects, of what a model with some columns
+        leaves, their strengths free."""
+        scores = self._scores(evidence, chosen)
+        return self._counted(scores.of_kinds).p(scores.farthest)
+
+    def pointed_at(self, evidence: Evidence, chosen: Sequence[int], level: float) -> list[int]:
+        """Lists columns of other effects that act beside some columns, by that test at a level,
+        the farthest first."""
+        scores = self._scores(evidence, chosen)
+        counted = self._counted(scores.of_kinds)
+        return [
+            self.columns.index(scores.sought[place].name)
+            for place in np.argsort(-scores.largest)
+            if counted.p(float(scores.largest[place])) <= self.passing(level)
+        ]
+
+    def passing(self, level: float) -> float:
+        """Returns p at or below which an effect acts beside a named one: `level`, or the least that
+        so many kinds allow."""
+        return max(level, 1 / (1 + self.count))
+
+    def power(self, tested: BaseModelTest, level: float) -> tuple[tuple[Sought, float], ...]:
+        """Lists effects that are tested for, but for a wind that is turned from its log, each with
+        the share of kinds beyond the critical value once it acts on them at its expected strength:
+        on average of both signs, where it may have either, but of the suspected one alone."""
+        critical = tested.null.critical(level)
+        if critical is None:
+            return ()
+        found: list[tuple[Sought, float]] = []
+        for place, one in enumerate(tested.scores.sought):
+            if one.name == TURNED:
+                continue
+            if self.suspected is not None:
+                column, sign = self.suspected
+                if self._place(column) != place:
+                    continue
+                one = replace(one, expected=sign * one.expected, signs=(sign,))
+            shares = []
+            for sign in one.signs:
+                if self.suspected is None:
+                    strength = sign * APPEARS * one.expected
+                    acted = tested.scores.of_kinds_with(place, strength)
+                else:
+                    moved = APPEARS * one.expected * tested.scores.moved[:, place, place]
+                    acted = sign * (tested.scores.null[:, place] + moved)
+                shares.append(float((np.maximum(acted, tested.courses) > critical).mean()))
+            found.append((one, float(np.mean(shares))))
+        return tuple(found)
 
     @cached_property
     def reach(self) -> FloatArray:
@@ -365,90 +420,9 @@ class Reference:
             ]
         )
 
-    def along(self, column: int, sign: int) -> Reference:
-        """Returns the null distributions that test along one effect alone, which was suspected
-        beforehand."""
-        return replace(self, suspected=(column, sign))
-
-    @cached_property
-    def test(self) -> GroupedConformal:
-        """That of the base model: along all, or along the suspected effect."""
-        if self.suspected is None:
-            return self.conformal
-        return GroupedConformal(null=pull_along(self.pulled, *self.suspected), kinds=self.kinds)
-
-    def tested(self, evidence: Evidence, columns: tuple[str, ...]) -> float:
-        """Computes the statistic of data that the base model is tested by."""
-        if self.suspected is None:
-            return self.farthest(evidence, columns)
-        return float(
-            pull_along(
-                standardise_pulls(pulls_of(evidence), self.pull, self.pull_width)[None],
-                *self.suspected,
-            )[0]
-        )
-
-    def power(self, level: float) -> tuple[tuple[Move, float], ...]:
-        """Lists effects that are tested for, each with the share of nulls beyond the critical value
-        once it acts on
-        them at its expected strength: on average of both signs, where it may have either, but of
-        the suspected one alone."""
-        critical = self.test.critical(level)
-        if critical is None:
-            return ()
-        shares = {
-            move: float((statistics_of > critical).mean())
-            for move, statistics_of in self._acting.items()
-        }
-        by_column: dict[int, list[Move]] = {}
-        for move in shares:
-            by_column.setdefault(move.column, []).append(move)
-        return tuple(
-            (signs[0], float(np.mean([shares[move] for move in signs])))
-            for signs in by_column.values()
-        )
-
-    @cached_property
-    def _acting(self) -> dict[Move, FloatArray]:
-        """Computes the statistic of nulls on which each effect that is tested for acts, as far as
-        appears, (group,)."""
-        statistics_of: dict[Move, FloatArray] = {}
-        for move in moves(self.columns):
-            if self.suspected is None or (move.column, move.sign) == self.suspected:
-                acted = [
-                    group.evidence.moved(move.column, APPEARS * move.strength)
-                    for group in self.groups
-                ]
-                statistics_of[move] = np.array(
-                    [
-                        self._statistic(evidence, group.own)
-                        for evidence, group in zip(acted, self.groups, strict=True)
-                    ]
-                )
-        return statistics_of
-
-    def _statistic(self, evidence: Evidence, segment: Nulls) -> float:
-        """Computes the test's statistic of a null group."""
-        usual = self.usual[int(segment.numerics[0])]
-        if self.suspected is None:
-            return float(usual.far(NullGroups.of(evidence, self.columns, segment)).max())
-        return float(pull_along(usual.pulled(pulls_of(evidence)[None]), *self.suspected)[0])
-
-    def statistics(
-        self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()
-    ) -> FloatArray:
-        """Computes (column,) statistics of data, as `scaled` has them, where some columns are
-        fitted already."""
-        shares = unscaled_drops(evidence, columns, along)
-        return shares / self.spread[: len(shares)]
-
-    def p_family(self, statistic: float, column: int) -> float:
-        """Computes the chance that in nulls any column is as far as this one."""
-        return self.conformal.p(float(self._distance(statistic * self.spread[column], column)))
-
-    def p_alone(self, statistic: float, column: int) -> float:
-        """Computes the chance that in nulls this column alone is as far."""
-        return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
+    def statistics(self, evidence: Evidence) -> FloatArray:
+        """Computes (column,) shares of data, as `scaled` has them."""
+        return shares_of_drops(evidence) / self.spread
 
     def reach_of(self, column: int) -> float:
         """Computes how many standard errors, those that make nulls' mean squared z 1, reach to
@@ -456,58 +430,14 @@ class Reference:
         null = GroupedConformal(null=self.scaled[:, column], kinds=self.kinds)
         return math.sqrt(null.quantile(CRITERIA.interval))
 
-    def p_left_by(
-        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]
-    ) -> float:
-        """Computes p of the global test on what some columns leave, fitted to the data."""
-        return self.conformal.p(self.farthest(evidence, columns, chosen))
-
-    def farthest(
-        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()
-    ) -> float:
-        """Computes how far the farthest of data is, where some columns are fitted already: the
-        statistic of the global test."""
-        shares, remainder = (
-            unscaled_drops(evidence, columns, chosen),
-            evidence.fit(chosen).remainder,
-        )
-        distance = max(
-            float(self._distance(shares, slice(len(shares))).max()),
-            float(self._distance(remainder, len(self.spread))),
-        )
-        best = best_gain(evidence, chosen, without=uncounted_columns(columns))
-        gained = float(self._distance(best, len(self.spread) + 1))
-        swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
-        further = [
-            swing,
-            None if line is None else line.far,
-            None if settles is None else float(settles.max()),
-        ]
-        return max(distance, gained, *(value for value in further if value is not None))
-
-    def swing(self, evidence: Evidence) -> float | None:
-        """Computes how far the wind's course of data swings, by the part that does most; None where
-        it is not looked at.
-
-        Raises:
-            UsageError: it is of the data, and was not of the nulls.
-        """
-        observed = evidence.swing
-        if observed is None:
-            return None
-        columns = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
-        if len(self.centre[columns]) != len(observed):
-            raise UsageError(
-                "only the data have courses of the wind",
-                where="reference",
-                fix="look at them in the nulls as well",
-            )
-        damped = observed * np.exp(-self.damping * self.powers)
-        return float(np.abs(self._by_tail(damped, columns)).max())
+    def p_of_course(self, evidence: Evidence) -> float | None:
+        """Computes p of the wind's course alone; None where it is not looked at."""
+        course = self._course(evidence)
+        return None if course is None else self._counted(course.null).p(course.value)
 
     def settles(self, evidence: Evidence) -> FloatArray | None:
-        """Computes how far each quantity of data lies that recordings settle at, (quantity,); None
-        where they are not looked at.
+        """Computes how far each quantity of data lies that recordings settle at, in nulls' standard
+        deviations, (quantity,); None where they are not looked at.
 
         Raises:
             UsageError: they are of the data, and were not of the nulls.
@@ -515,41 +445,88 @@ class Reference:
         settled = evidence.settles
         if settled is None:
             return None
-        begin = len(self.spread) + 2 + len(self.powers)
-        columns = slice(begin, len(self.centre) - (self.lines is not None))
-        if len(self.centre[columns]) != len(settled):
+        if self.settled.shape[1] != len(settled):
             raise UsageError(
                 "only the data have settled quantities",
                 where="reference",
                 fix="look at them in the nulls as well",
             )
-        return np.abs(self._by_tail(settled, columns))
+        width = np.maximum(self.settled.std(axis=0), _NARROWEST)
+        return np.abs(settled - self.settled.mean(axis=0)) / width
 
-    def line(self, evidence: Evidence) -> SpectralLine | None:
-        """Finds the most prominent line of data; None where spectra are not looked at.
+    def line(self, evidence: Evidence, level: float) -> SpectralLine | None:
+        """Finds the most prominent line of data, where it is farther than in all but a share
+        `level` of nulls; None where spectra are not looked at.
 
         Raises:
             UsageError: they are, of the data or of the nulls alone.
         """
         if self.lines is None and evidence.lines is None:
             return None
-        if self.lines is None or evidence.lines is None:
+        if self.lines is None or evidence.lines is None or self.standing_out is None:
             raise UsageError(
                 "only the nulls or only the data have spectra",
                 where="reference",
                 fix="look at lines in both or in none",
             )
-        line = self.lines.line(
-            evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1])
-        )
-        return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
+        centre = float(self.standing_out.mean())
+        width = max(float(self.standing_out.std()), _NARROWEST)
+        line = self.lines.line(evidence.lines, centre=centre, width=width)
+        null = GroupedConformal(null=(self.standing_out - centre) / width, kinds=self.kinds)
+        return line if null.p(line.far) <= level else None
 
-    def _distance(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
-        """Computes how far shares, what is left or the best gain lie, as `far` has it."""
-        return self._by_tail(np.cbrt(values), columns)
-
-    def _by_tail(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
-        """Computes how far roots lie, as they are."""
-        return as_normal(
-            (values - self.centre[columns]) / self.width[columns], self.degrees[columns]
+    def _scores(self, evidence: Evidence, chosen: Sequence[int] = ()) -> DirectedScores:
+        places = [self.columns.index(one.name) for one in self.directed.sought]
+        summary = summarise_evidence(
+            evidence, places, usual_speed=self.usual_speed, damping=self.damping
         )
+        free = [places.index(column) for column in chosen if column in places]
+        return self.directed.scores(summary, free)
+
+    def _course(self, evidence: Evidence) -> _Course | None:
+        """Computes how far the wind's course swings, of data and of each kind by all others.
+
+        Raises:
+            UsageError: it is of the data, and was not of the nulls.
+        """
+        observed = evidence.swing
+        if observed is None:
+            return None
+        if self.swings.shape[1] != len(observed):
+            raise UsageError(
+                "only the data have courses of the wind",
+                where="reference",
+                fix="look at them in the nulls as well",
+            )
+        powers = np.array([power(np.abs(part), self.dampings) for part in self.swings.T])
+        own = self.swings * np.exp(-np.outer(self.dampings, powers))
+        of_kinds = [
+            _farthest_part(own[kind], np.delete(own, kind, axis=0)) for kind in range(len(own))
+        ]
+        value = _farthest_part(observed * np.exp(-self.damping * powers), own)
+        return _Course(value=value, null=np.array(of_kinds))
+
+    def _place(self, column: int) -> int:
+        """Returns the place of a column among the effects that are sought."""
+        return [one.name for one in self.directed.sought].index(self.columns[column])
+
+    def _counted(self, null: FloatArray) -> GroupedConformal:
+        return GroupedConformal(null=null, kinds=np.arange(len(null)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Course:
+    """How far the wind's course swings, of data and of each kind (kind,)."""
+
+    value: float
+    null: FloatArray
+
+
+def _farthest_part(swings: FloatArray, others: FloatArray) -> float:
+    """Computes how far the farthest part (part,) is from the mean of others (kind, part)."""
+    width = np.maximum(others.std(axis=0, ddof=1), _NARROWEST)
+    return float((np.abs(swings - others.mean(axis=0)) / width).max())
+
+
+def _spread(shares: FloatArray) -> FloatArray:
+    return np.maximum(shares.mean(axis=0), _UNOBSERVABLE)

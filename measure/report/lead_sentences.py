@@ -243,4 +243,6 @@ def _incomplete(verdict: Verdict) -> str:
                 "than chance, so that "
                 "another dependence on the wind would fit better"
             )
+    if verdict.test.directed is not None:
+        return "what remains goes the way of another effect, and both do not explain it either"
     return "the errors that remain are larger than those of simulations"

@@ -266,7 +266,7 @@ def _sections(verdict: Verdict, experiment: Experiment | None) -> list[Section]:
         f"The statistic is how far the recordings go the way of {suspected}, the only direction "
         "that is tested, since it was stated beforehand."
         if suspected
-        else ""
+        else verdict_sentences.statistic_text(verdict.test)
     )
     made.append(sections.test_section(verdict, statistic))
     if verdict.power:
@@ -436,7 +436,8 @@ def _ranking(verdict: Verdict) -> Section:
         ],
         rows=rows,
         caption="Best first, those of an unphysical strength last; in bold those that are named. "
-        "An effect is detected by its calibrated p-value and named by its held-out gain. "
+        "Effects are in the order of z; of those that predict unseen recordings, those within one "
+        "deviation of the largest z are not separated. "
         f"Intervals at {level}.",
     )
     charts = [
@@ -468,10 +469,11 @@ def _ranking(verdict: Verdict) -> Section:
 
 
 _HOW_RANKED = (
-    "z is the strength in standard errors. p alone compares the candidate's statistic with that of "
-    "the nulls. Family-wise p compares it with the largest of all candidates in each null. Gain is "
-    "the log likelihood on unseen data less the base model's, ± its standard error. Behind counts "
-    "standard errors of the paired difference to the best. p remaining is the global test's p of "
-    "the errors that remain with this effect. p for the same is that of one strength in all "
-    "recordings (Cochran's Q)."
+    "z is how far the recordings go the way of the effect, in standard deviations of nulls; of "
+    "gusts, how far the wind's course swings. p alone compares it with that of the nulls. "
+    "Family-wise p compares it with the largest of all candidates in each null. Gain is the log "
+    "likelihood on unseen data less the base model's, ± its standard error. Behind counts standard "
+    "errors of the paired difference to the best. p remaining is that of the same test along all "
+    "other effects, this one free. p for the same is that of one strength in all recordings "
+    "(Cochran's Q)."
 )

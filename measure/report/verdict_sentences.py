@@ -172,6 +172,23 @@ def test_sentence(verdict: Verdict) -> str:
     )
 
 
+def statistic_text(test: NullTest) -> str:
+    """Describes the statistic of a test along the library's effects; empty of other tests."""
+    if test.directed is None:
+        return ""
+    largest = (
+        "The statistic is how far the recordings go the way of the effect that they go farthest: "
+        f"{number(test.directed)} standard deviations of nulls"
+    )
+    if test.course is None or test.course_share is None:
+        return f"{largest}."
+    return (
+        f"{largest}. Or it is how far the wind's course swings, on a scale by which that takes "
+        f"{number(100 * test.course_share)} % of the level: {number(test.course)}. The larger one "
+        "counts, and nothing else decides."
+    )
+
+
 def _counting_sentence(test: NullTest) -> str:
     """Explains how p is counted."""
     if test.effective is None:

@@ -77,13 +77,14 @@ def with_sentences(outcome: LoopOutcome) -> Verdict:
 
 
 def _lacking(outcome: LoopOutcome) -> str:
-    """Describes what the library lacks, where it has no answer or half of one."""
-    if not outcome.field:
-        return ""
+    """Describes what the library lacks, where it has no answer or half of one, and what remains
+    beside its answer."""
     sentences = [] if outcome.line is None else [shedding(outcome.line)]
     if outcome.course is not None and outcome.course.total[ALONG] > 0:
         sentences.append(blowing(outcome.course))
-    return " ".join([*sentences, proposal(outcome.field, is_all=outcome.whole)])
+    if outcome.field:
+        sentences.append(proposal(outcome.field, is_all=outcome.whole))
+    return " ".join(sentences)
 
 
 def by_draw(test: NullTest) -> tuple[str, ...]:

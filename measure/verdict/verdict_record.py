@@ -49,15 +49,16 @@ class Candidate:
         parameter: of the effect.
         strength: as fitted, with the effect's own unit.
         null: the strength at which the effect is not there.
-        z: of the strength against the null distribution.
-        p_value: of |z| for this candidate alone.
-        p_family: of the largest |z| of all candidates.
+        z: how far the recordings go its way, in standard deviations of nulls.
+        p_value: of z for this candidate alone.
+        p_family: of the largest z of all candidates.
         gain: held-out improvement of the fit over the base model, in units of log likelihood;
             higher is better. On films the logarithm of the Bayes factor.
         gain_error: its standard error.
         behind: how many standard errors of the paired difference it lies behind the best candidate;
             0 for the best.
-        leftover: p-value of what the model with it still leaves unexplained.
+        leftover: p-value of what the model with it still leaves unexplained; on trajectories that
+            of the test along all other effects.
         by_recording: strength fitted on each recording alone, in the order of the recordings; of a
             refitted candidate about what it then has.
         heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single
@@ -160,7 +161,7 @@ class NullTest:
     """The global test.
 
     Attributes:
-        statistic: observed: how far the farthest column is from nulls' mean, in their standard
+        statistic: observed: how far the recordings are from nulls' mean, in their standard
             deviations (see `measure.nulls.reference`).
         null: the same of every group of simulated nulls.
         p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`,
@@ -181,6 +182,10 @@ class NullTest:
         tail: p by the tail of Student's t, beside the one that is counted.
         suspected: the effect with its sign that was suspected before the recordings were looked at,
             along which alone was looked; empty where none was.
+        directed: how far the recordings go the way of the effect that they go farthest, in nulls'
+            deviations; None on films.
+        course: how far the wind's course swings, on the same scale; None where it is not tested.
+        course_share: of the level that is its.
     """
 
     statistic: float
@@ -196,6 +201,9 @@ class NullTest:
     correlation: float | None = None
     tail: float | None = None
     suspected: str = ""
+    directed: float | None = None
+    course: float | None = None
+    course_share: float | None = None
 
     @property
     def least(self) -> float:
@@ -263,8 +271,8 @@ class Verdict:
         assumptions: what was taken as given.
         separating: the cheapest experiment that would separate the named effects; empty where one
             is named.
-        proposal: what the corrective field looks like and the terms it proposes, where the library
-            has no answer.
+        proposal: what remains beside what was named; what the corrective field looks like and the
+            terms it proposes, where the library has no answer.
         apart: half misfit of the wrong-effect control less that of what was named, a segment, over
             all recordings left out in turn [nat]; None where no control was run.
         findings: remarks on the data (kind, text).

@@ -89,6 +89,10 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
                 "tests.studies.validation.datasets",
                 "A data set built, and built again after kills.",
             ),
+            "directed": (
+                "tests.studies.validation.directed",
+                "What the test along the effects sees in sets of one design.",
+            ),
             "drapes": (
                 "tests.studies.validation.drapes",
                 "Measured drapes of five fabrics, and their faces.",

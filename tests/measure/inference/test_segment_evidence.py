@@ -11,7 +11,7 @@ from scipy.stats import chi2, kstest, uniform
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import PRIOR, THETA, Design
-from measure.inference import Evidence, NullModel, Nulls, best_gain, gains
+from measure.inference import Evidence, NullModel, Nulls, gains
 from measure.inference.fluctuation import fluctuation
 from measure.nulls import GUSTS, NullBank
 from measure.probes import Statistics
@@ -216,7 +216,7 @@ def test_p_values_of_nulls_are_uniform() -> None:
     found = []
     for _ in range(150):
         data = world.data(null, effect(0.0))
-        found.append(reference.p_left_by(data, columns, ()))
+        found.append(reference.test(data).p)
     # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the
     # most.
     assert kstest(found, uniform.cdf).statistic < 2 / 40**0.5
@@ -396,40 +396,6 @@ def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_eve
     assert fluctuation(freed, 5).likelihood == pytest.approx(0, abs=1e-9)
 
 
-def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
-    world = World(5)
-    columns = (
-        *(name for name, _, _ in THETA),
-        *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)),
-        GUSTS,
-    )
-    bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
-    reference, null, place = (
-        bank.reference(12, noise=0.0, seed=1),
-        bank.model(bank.nulls.design),
-        COLUMNS - 1,
-    )
-    before, after = [], []
-    for _ in range(30):
-        evidence = world.data(null, effect(0.0))
-        extra = world.rng.normal(0, 1.5, len(evidence.recording))
-        moved = Evidence(
-            recording=evidence.recording,
-            curvature=evidence.curvature,
-            columns=evidence.columns,
-            score=evidence.score + extra[:, None] * evidence.curvature[:, :, place],
-            energy=evidence.energy
-            + 2 * extra * evidence.score[:, place]
-            + extra**2 * evidence.curvature[:, place, place],
-        )
-        freed = moved.freed(place)
-        before.append(reference.p_left_by(moved, columns, ()))
-        after.append(reference.beside().p_left_by(freed, columns, ()))
-    assert np.median(before) == reference.conformal.least
-    # As of nulls, whose p-values are uniform: 30 of them have a median of 0.5 ± 0.09.
-    assert np.median(after) > 0.25
-
-
 def test_nulls_fluctuate_little(world: World, null: NullModel) -> None:
     assert (
         np.median([fluctuation(world.data(null, effect(0.0)), 5).deviation for _ in range(40)])
@@ -461,29 +427,6 @@ def test_what_numerics_leave_is_that_of_the_damping_of_the_data(world: World) ->
         )
 
 
-def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_there(
-    null: NullModel,
-) -> None:
-    world = World(11)
-    without = [best_gain(world.data(null, effect(0.0))) for _ in range(20)]
-    acts = world.data(null, effect(2.0))
-    one = float(gains(acts, [[5]]).sum())
-    assert best_gain(acts) == pytest.approx(one)
-    assert one > max(without) + 5
-    # Beside it no other column helps more than where nothing acts.
-    assert best_gain(acts, [5]) < max(without) + 3
-
-
-@pytest.mark.parametrize("beside", [(), (5,), (4, 7)])
-def test_the_best_gain_is_the_largest_of_those_of_all_others(
-    null: NullModel, beside: tuple[int, ...]
-) -> None:
-    acts = World(12).data(null, effect(1.0))
-    others = [column for column in range(len(THETA), COLUMNS) if column not in beside]
-    alone, *more = gains(acts, [beside, *((*beside, column) for column in others)]).sum(axis=1)
-    assert best_gain(acts, beside) == pytest.approx(max(more) - alone, rel=1e-9)
-
-
 def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
     """An effect that grows by the square of the wind, beside a parameter that does the same in all:
     to 9, 25 and 49 the mean, 27.7, leaves squares of 809; each left out, the mean of the others
@@ -508,4 +451,5 @@ def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
     )
     evidence = Evidence.of(found, speeds, null)
     assert evidence.drops()[-1] / 2 == pytest.approx(4 * 809 / 2, rel=1e-2)
-    assert best_gain(evidence) == pytest.approx(4 * 1824 / 2, rel=1e-2)
+    last = evidence.columns - 1
+    assert gains(evidence, [[last]]).sum() == pytest.approx(4 * 1824 / 2, rel=1e-2)

@@ -22,3 +22,10 @@ def null(bank: NullBank) -> NullModel:
 @pytest.fixture(scope="session")
 def reference(bank: NullBank) -> Reference:
     return bank.reference(12, noise=0.0, seed=1)
+
+
+@pytest.fixture(scope="session")
+def blowing() -> tuple[NullModel, Reference]:
+    """What judges by nulls whose wind's course is looked at."""
+    bank = made(seed=1, courses=True)
+    return bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)

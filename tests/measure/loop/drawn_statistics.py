@@ -10,7 +10,7 @@ import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
-from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names
+from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names, on_markers
 from measure.inference import Evidence, NullModel, Nulls
 from measure.loop import GUST_COLUMN, LibraryJudgement, judge
 from measure.nulls import GUSTS, NullBank, Reference
@@ -30,8 +30,8 @@ def expected(column: int) -> float:
     own = columns()[column - len(THETA)]
     if not isinstance(own, EffectColumn):
         return 0.5
-    low, high = (end - own.described.null for end in own.described.prior)
-    return high if high > -low else low
+    weighed = {one.name: one.expected for one in on_markers()}
+    return weighed.get(own.name, max(end - own.described.null for end in own.described.prior))
 
 
 EXPECTED = np.array([expected(column) for column in range(COUNT)])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from measure.forecasting import THETA, names
+from measure.forecasting import THETA
 from measure.inference import NullModel
 from measure.loop import judge
 from measure.nulls import Reference
@@ -28,17 +28,14 @@ def test_nothing_is_found_where_nothing_acts(judges: list[tuple[NullModel, Refer
     times."""
     rejected = 0
     for null, reference in judges[:6]:
-        chances = [
-            reference.conformal.p(reference.farthest(seen(null, {}, seed=seed), names()))
-            for seed in range(40)
-        ]
+        chances = [reference.test(seen(null, {}, seed=seed)).p for seed in range(40)]
         rejected += sum(p <= 0.05 for p in chances)
     assert rejected <= 18
 
 
 def test_what_is_not_rejected_needs_no_effect(null: NullModel, reference: Reference) -> None:
     found = [judged(null, reference, {}, seed=seed) for seed in range(20)]
-    assert [j.conclusion in NOT_REJECTED for j in found] == [j.p_value > 0.02 for j in found]
+    assert [j.conclusion in NOT_REJECTED for j in found] == [j.test.p > 0.02 for j in found]
     assert all(not j.named for j in found if j.conclusion in NOT_REJECTED)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.core.rng import stream
-from measure.forecasting import THETA, names
+from measure.forecasting import THETA, library, names
 from measure.inference import Evidence, NullModel
 from measure.loop import judge
 from measure.loop.effect_selection import withdrawn
@@ -33,35 +33,57 @@ def predicting(evidence: Evidence, each: float, *, leftover: float = 0.5, seed: 
     return Refit(coefficient=0.3, gains=gained, leftover=leftover, evidence=evidence)
 
 
+OTHERS = {
+    column: None
+    for column in range(len(THETA), len(THETA) + len(library()))
+    if column not in (LIFT, HEM)
+}
+
+
 @pytest.mark.parametrize(
-    ("hem", "left", "said"),
+    ("hem", "left", "said", "concluded"),
     [
-        (5.0, (0.5, 0.5), ["hem-mass.line_density", "lift.coefficient"]),
-        (
-            3.0,
-            (0.5, 0.5),
-            ["lift.coefficient"],
-        ),  # a difference of 24 to a standard error of √24 = 4.9
-        (5.0, (0.01, 0.5), ["hem-mass.line_density"]),
-        (5.0, (0.5, 0.01), ["lift.coefficient"]),
+        # Both predict as well, a difference of 24 to a standard error of √24 = 4.9 or none, and the
+        # recordings go the way of lift.
+        (5.0, (0.5, 0.5), ["lift.coefficient"], Conclusion.EFFECT),
+        (3.0, (0.5, 0.5), ["lift.coefficient"], Conclusion.EFFECT),
+        (5.0, (0.5, 0.01), ["lift.coefficient"], Conclusion.EFFECT),
+        # It does not pass, and with no other effect beside it predictions are better.
+        (5.0, (0.01, 0.5), ["lift.coefficient"], Conclusion.EFFECT),
+        # What predicts best is what the recordings do not go the way of.
+        (20.0, (0.5, 0.5), [], Conclusion.OUTSIDE),
     ],
 )
-def test_what_is_named_is_the_confidence_set_less_what_fails_its_predictive_test(
-    null: NullModel, reference: Reference, hem: float, left: tuple[float, float], said: list[str]
+def test_what_is_named_is_the_first_of_those_that_predict_unseen_recordings(
+    null: NullModel,
+    reference: Reference,
+    hem: float,
+    left: tuple[float, float],
+    said: list[str],
+    concluded: Conclusion,
 ) -> None:
     data, rest = seen(null, {"lift.coefficient": 1.0}), seen(null, {}, seed=3)
     refits = {
         LIFT: predicting(rest, 5.0, leftover=left[0]),
         HEM: predicting(rest, hem, leftover=left[1], seed=1),
-        **{
-            column: None
-            for column in range(len(THETA), len(THETA) + 18)
-            if column not in (LIFT, HEM)
-        },
+        **OTHERS,
     }
     found = judge(data, reference, level=0.02, refits=refits)
-    assert sorted(named(found)) == said
-    assert found.conclusion is (Conclusion.ONE_OF if len(said) > 1 else Conclusion.EFFECT)
+    assert (sorted(named(found)), found.conclusion) == (said, concluded)
+
+
+def test_what_does_not_pass_explains_a_part_where_a_pair_predicts_better_and_does_not_pass_either(
+    null: NullModel, reference: Reference
+) -> None:
+    data = seen(null, {"lift.coefficient": 1.0})
+    three = {"hem-mass.line_density": 1.0, "tangential-quadratic-drag.coefficient": 1.0}
+    refits = {
+        LIFT: predicting(seen(null, three, seed=3), 5.0, leftover=0.01),
+        HEM: predicting(seen(null, {}, seed=3), 5.0, seed=1),
+        **OTHERS,
+    }
+    found = judge(data, reference, level=0.02, refits=refits)
+    assert (named(found), found.conclusion) == (["lift.coefficient"], Conclusion.PARTLY)
 
 
 def test_where_the_base_model_predicts_as_well_nothing_is_named(
@@ -74,8 +96,8 @@ def test_where_the_base_model_predicts_as_well_nothing_is_named(
         leftover=0.5,
         evidence=seen(null, {}, seed=3),
     )
-    refits = dict.fromkeys(range(len(THETA), len(THETA) + 18), useless)
-    found = judge(seen(null, {}, line=10.0), reference, level=0.02, refits=refits)
+    refits = dict.fromkeys((LIFT, HEM, *OTHERS), useless)
+    found = judge(seen(null, {"lift.coefficient": 1.0}), reference, level=0.02, refits=refits)
     assert (found.conclusion, found.named, found.confident) == (Conclusion.OUTSIDE, (), ())
 
 

@@ -54,6 +54,6 @@ def test_a_hoist_that_stands_still_leads_whatever_the_test_says(
     null: NullModel, reference: Reference
 ) -> None:
     found = judge(seen(null, {}), reference, level=0.02, set_up=SetUp(attached=True))
-    assert found.p_value > 0.02
+    assert found.test.p > 0.02
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [HOIST])
     assert names().index(HOIST) in finalists(found)

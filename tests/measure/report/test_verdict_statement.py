@@ -170,8 +170,14 @@ def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: LoopOutcome) 
     assert said.startswith("The smooth force field that fits the remaining errors best")
 
 
-def test_an_outcome_with_an_answer_proposes_nothing(outcome: LoopOutcome) -> None:
-    assert with_sentences(replace(outcome, field=())).proposal == ""
+def test_an_outcome_with_an_answer_says_what_remains_and_proposes_nothing(
+    outcome: LoopOutcome,
+) -> None:
+    answered = replace(outcome, field=(), course=None)
+    remains = with_sentences(answered).proposal
+    assert remains.startswith("The errors oscillate")
+    assert "force field" not in remains
+    assert with_sentences(replace(answered, line=None)).proposal == ""
 
 
 @pytest.mark.parametrize(
