@@ -115,7 +115,7 @@ def dragged(pulled: Experiment, bank: Path) -> Verdict:
 
 
 def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, bank: Path) -> None:
-    nulls = banks.load(bank, words="made").nulls
+    nulls = banks.load(bank, words="made", batches=batches(specimen)).nulls
     first = batches(specimen)[0].calibrations[0].damping
     assert nulls.design.damping == pytest.approx(first, rel=1e-12)
     known = replace(nulls.design, damping=first)
