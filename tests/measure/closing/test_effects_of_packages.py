@@ -125,7 +125,12 @@ def test_it_is_named_from_markers_and_what_was_not_weighed_is_listed(
         seed=77,
         effects=(fan(acceleration=6.0),),  # pyright: ignore[reportCallIssue]
     )
-    experiment = Experiment(specimen=specimen, recordings=tuple(blown.simulate()))
+    # A push across the wind is also what a wind does that is turned from its log, which a verdict
+    # names whatever its test says; of a log whose direction is exact that is one more effect.
+    recordings = tuple(
+        replace(one, wind=replace(one.wind, direction=0.0)) for one in blown.simulate()
+    )
+    experiment = Experiment(specimen=specimen, recordings=recordings)
     found = close_loop(experiment, LoopOptions(bank=tmp_path, level=0.1))
     assert (found.conclusion, found.named) == (Conclusion.EFFECT, ("fan",))
     (named,) = (one for one in found.ranking if not one.why_not)
