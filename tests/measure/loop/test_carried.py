@@ -137,12 +137,12 @@ def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank:
         assert any("carried where the markers at them go" in words for words in verdict.assumptions)
 
 
-def test_a_strong_effect_on_a_carried_cloth_is_found_and_named(bank: Path) -> None:
+def test_the_first_by_its_score_is_what_acts_on_a_carried_cloth(bank: Path) -> None:
+    """Twelve kinds show too little of how they scatter to reject by it: p is by 40 elsewhere."""
     verdict = close_loop(experiment(DRAG, seed=77), LoopOptions(bank=bank, level=LEVEL))
-    assert verdict.test.p_value.value == pytest.approx(1 / (KINDS + 1))
-    assert verdict.named[:1] == ("tangential-linear-drag",)
-    strength = verdict.ranking[0].strength
-    assert strength.low < 0.8 < strength.high
+    first, second = verdict.ranking[:2]
+    assert first.effect == "tangential-linear-drag"
+    assert first.z == verdict.test.directed == verdict.test.statistic > second.z
 
 
 def test_nulls_of_cloths_held_still_do_not_judge_one_that_is_carried(bank: Path) -> None:
