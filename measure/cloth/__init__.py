@@ -15,8 +15,9 @@ if TYPE_CHECKING:
         phrase_quantity,
         table_of_quantities,
     )
+    from measure.cloth.calibration_result import Calibration
     from measure.cloth.close_films import simulations_of
-    from measure.cloth.cloth_calibration import Calibration, calibrate, quantity
+    from measure.cloth.cloth_calibration import calibrate, quantity
     from measure.cloth.cloth_posterior import weigh_cloths
     from measure.cloth.design import (
         TOGETHER,

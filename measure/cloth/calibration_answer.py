@@ -17,7 +17,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
 from flagdata.core.shell import command_line
 from flagdata.pages.page_pictures import moving
-from measure.cloth.cloth_calibration import Calibration, Fitted
+from measure.cloth.calibration_result import Calibration, Fitted
 from measure.cloth.flag_prior import CLOTH
 from measure.cloth.flag_simulation import OBSERVED
 from measure.cloth.observables_chart import Predicted, chart_against_wind

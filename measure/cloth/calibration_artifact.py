@@ -15,7 +15,8 @@ from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.mesh_sequences import write_plain
 from flagdata.lake.results import Placed
-from measure.cloth.cloth_calibration import ANSWER, Calibration
+from measure.cloth.calibration_result import Calibration
+from measure.cloth.cloth_calibration import ANSWER
 from measure.cloth.flag_simulation import OBSERVED, VERSION
 from measure.film.film_source import FilmReading
 from measure.observables.observables_artifact import VERSION as READINGS

@@ -24,7 +24,7 @@ from flagdata.verbs.verb_options import (
 
 if TYPE_CHECKING:
     from flagdata.answer.calibrated import Calibrated
-    from measure.cloth.cloth_calibration import Calibration
+    from measure.cloth.calibration_result import Calibration
 
 
 @options

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from flagdata.answer.calibrated import Calibrated
     from flagdata.lake import Artifact, Lake
     from measure.anemometer.making import Made
-    from measure.cloth.cloth_calibration import Calibration
+    from measure.cloth.calibration_result import Calibration
     from measure.cloth.flag_recordings import Sources
     from measure.film.film_source import FilmReading
     from measure.film.similarity import FlagSize

@@ -4,18 +4,10 @@ rest.
 Errors are projected on directions whose null distribution is known, because errors of the numerics
 could look like a term. The selected model is refitted and tested on data not used before, against
 control terms of another direction and against the numerical floor.
-
-What a proposal may see and what it is tested on: divided before anything is fitted.
-
-Gauss–Newton fits of models to projected errors: linearised again at each estimate until it
-converges.
-
-Before and after on data that neither the choice of the terms nor the fit of either model used.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,195 +15,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
-from measure.forecasting.calibrated_parameters import THETA, Calibration
-from measure.forecasting.model import Model
+from measure.forecasting.calibrated_parameters import THETA
 from measure.forecasting.regressors import Column, EffectColumn, columns
-from measure.forecasting.segments import Segments
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.random_effect import NullModel
 from measure.inference.segment_evidence import Evidence, gains
-from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.loop.gauss_newton import ROUNDS, STAYS, cut
 from measure.loop.strength_estimates import estimate
-from measure.loop.validation import (
-    LeftOut,
-    a_segment,
-    measure_left_out,
-    numerical_floor,
-    paired_difference,
-    root,
-    share_removed,
-)
 from measure.nulls import null_plan
 from measure.nulls.reference import NullBank
 from measure.probes.statistics import Statistics
 from measure.propose.family import Family
 from measure.propose.outcome import Decision, ProposalOutcome, Ranked, Retest, TermStrength
 from measure.propose.projected import ProjectedSegments, evidence
+from measure.propose.projected_fit import FittedModel, fit
+from measure.propose.proposal_split import Split, data_hash, split
 from measure.propose.regressor_course import course
+from measure.propose.retest import retest
 from measure.propose.search import Step, search, wrong
 from measure.propose.terms import MASS, TermColumn
 from measure.trajectories.trajectory import Experiment
 from sim.effects.field import Flat
-
-_FLOOR_COPIES = 2
-
-
-def retest(
-    setting: Setting,
-    whitened: WhitenedMisfit,
-    used: BoolArray,
-    before: Model,
-    after: Model,
-    *,
-    control: Model | None,
-    control_names: Sequence[str],
-    words: str,
-    seed: int,
-) -> Retest:
-    """Compares prediction errors of untouched segments by the models, paired by segment, beside
-    what numerics leave.
-
-    Args:
-        whitened: of all segments.
-        used: (segment,) those that the models were fitted to, and that what is left of the numerics
-            is fitted to.
-        control: the same freedom spent on other terms; None where there are none of another
-            direction.
-        control_names: which.
-        words: which data.
-        seed: of the recordings that the floor is of.
-    """
-
-    def misfits_left(model: Model) -> LeftOut:
-        return measure_left_out(setting.forecaster, setting.segments, [model], whitened, [~used])[0]
-
-    first, second, recording = misfits_left(before), misfits_left(after), setting.recording[~used]
-    wrong = None if control is None else misfits_left(control)
-    _, floor = numerical_floor(
-        setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed
-    )
-    return Retest(
-        what=words,
-        segments=int((~used).sum()),
-        before=root(first.squared),
-        after=root(second.squared),
-        reduction=paired_difference(first.squared, second.squared),
-        helped=a_segment(first.misfit - second.misfit, recording),
-        floor=root(floor),
-        share=share_removed(first.squared, second.squared, floor),
-        control=None if wrong is None else root(wrong.squared),
-        apart=None if wrong is None else a_segment(wrong.misfit - second.misfit, recording),
-        control_names=tuple(control_names),
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FittedModel:
-    """A model with standard errors of its calibrated parameters and strengths, as the null model
-    has them."""
-
-    model: Model
-    errors: tuple[float, ...]
-
-
-def fit(
-    projected: ProjectedSegments,
-    null: NullModel,
-    speeds: FloatArray,
-    columns: Sequence[EffectColumn],
-    start: Sequence[float],
-) -> FittedModel:
-    """Fits calibrated parameters and strengths, by Gauss and Newton.
-
-    Args:
-        speeds: (segment,) of the wind [m/s].
-        start: steps from the nominal model to begin with: the linear fit there.
-    """
-    model = Model(calibration=Calibration(), effects=tuple((column, 0.0) for column in columns))
-    step, errors = np.array(cut(np.array(start, dtype=np.float64))), np.zeros(len(start))
-    for _ in range(ROUNDS):
-        model = model.moved(tuple(step))
-        step, errors = _step(projected, null, speeds, model)
-        if np.abs(step / errors).max() < STAYS:
-            break
-    return FittedModel(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
-
-
-def _step(
-    projected: ProjectedSegments, null: NullModel, speeds: FloatArray, model: Model
-) -> tuple[FloatArray, FloatArray]:
-    """Takes one step of generalised least squares from a model, under the prior about the nominal
-    calibration, and returns its standard errors."""
-    projected_evidence = evidence(projected.at(model), speeds, null)
-    fitted = projected_evidence.fit(
-        range(len(THETA), projected_evidence.columns),
-        centre=Calibration().steps_from(model.calibration),
-    )
-    value, error = np.array([fitted.of(column) for column in range(projected_evidence.columns)]).T
-    return np.array(cut(value)), error
-
-
-_LEAST = 3
-"""Segments on each side: an interval of a mean wants three."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Split:
-    """Segments for choosing and fitting, and segments for the test.
-
-    Attributes:
-        used: (segment,) whether a proposal is made from it; the others are for its test.
-        words: what the test is on.
-    """
-
-    used: BoolArray
-    words: str
-
-
-def split(segments: Segments, speeds: FloatArray) -> Split:
-    """Splits off the last third of every recording for the test; of three or more, also the whole
-    one of the middle wind.
-
-    Args:
-        speeds: (recording,) of the wind [m/s].
-
-    Raises:
-        InputError: too few segments.
-    """
-    recording = segments.recording
-    used = np.ones(len(recording), dtype=bool)
-    words = "the last third of each recording"
-    for index in np.unique(recording):
-        of_recording = np.flatnonzero(recording == index)
-        used[of_recording[-max(1, len(of_recording) // 3) :]] = False
-    if len(speeds) > 2:
-        middle = int(np.argsort(speeds, kind="stable")[len(speeds) // 2])
-        used[recording == middle] = False
-        words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
-    if min(int(used.sum()), int((~used).sum())) < _LEAST:
-        raise InputError(
-            f"there are {int(used.sum())} segments to propose from and {int((~used).sum())} to "
-            "test on",
-            where="propose",
-            fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
-        )
-    return Split(used=used, words=words)
-
-
-def data_hash(segments: Segments) -> str:
-    """Hashes the markers, positions and wind of segments, SHA-256, hex."""
-    digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
-    for item in segments.items:
-        times = np.asarray(
-            item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64
-        )
-        for values in (item.positions, item.wind.at(times)):
-            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-    return digest.hexdigest()
-
 
 _CALM = 0.3
 """Wind below which its direction is not known well enough for terms along it [m/s]."""
@@ -308,28 +133,56 @@ def weigh(
         controls=controls,
         seed=options.seed,
     )
-    steps = search(
-        prepared.evidence,
-        prepared.family,
-        prepared.labels,
-        prepared.pool,
-        acting=prepared.acting,
-        level=options.level,
-    )
+    steps = prepared.search(level=options.level)
     stage("terms", 1, 1)
-    taken = [step for step in steps if step.taken]
-    strengths: tuple[TermStrength, ...] = ()
     tested = None
-    decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
-    if taken:
+    if taken := [step for step in steps if step.taken]:
         stage("test on untouched data", 0, 1)
-        larger = prepared.fit([*prepared.acting, *(step.column for step in taken)])
-        tested = _retest_against_control(setting, prepared, taken, larger, seed=options.seed)
-        strengths = _strengths(
-            setting, prepared.evidence, prepared.family, taken, prepared.acting, larger
-        )
-        decision, reason = tested.decision
+        tested = _test_terms(setting, prepared, taken, seed=options.seed)
         stage("test on untouched data", 1, 1)
+    return _outcome(setting, prepared, steps, tested, nulls=bank.words, options=options)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Tested:
+    """Terms that were taken: how much they help on untouched segments, and how strong they are."""
+
+    retest: Retest
+    strengths: tuple[TermStrength, ...]
+
+
+def _test_terms(
+    setting: Setting, prepared: _Prepared, taken: Sequence[Step], *, seed: int
+) -> _Tested:
+    """Fits the model with what was taken, and tests it on untouched segments."""
+    larger = prepared.fit([*prepared.acting, *(step.column for step in taken)])
+    return _Tested(
+        retest=_retest_against_control(setting, prepared, taken, larger, seed=seed),
+        strengths=_strengths(
+            setting, prepared.evidence, prepared.family, taken, prepared.acting, larger
+        ),
+    )
+
+
+def _outcome(
+    setting: Setting,
+    prepared: _Prepared,
+    steps: tuple[Step, ...],
+    tested: _Tested | None,
+    *,
+    nulls: str,
+    options: null_plan.NullOptions,
+) -> ProposalOutcome:
+    """States what was found, and on which data.
+
+    Args:
+        tested: None where no term was taken.
+        nulls: which the terms were compared with, in words.
+    """
+    if tested is None:
+        decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
+    else:
+        decision, reason = tested.retest.decision
     untouched = setting.segments.select(np.flatnonzero(~prepared.parts.used))
     return ProposalOutcome(
         decision=decision,
@@ -337,13 +190,13 @@ def weigh(
         steps=steps,
         tried=prepared.tried,
         ranking=_ranking(prepared.evidence, prepared.family, prepared.labels, prepared.pool),
-        strengths=strengths,
-        retest=tested,
+        strengths=() if tested is None else tested.strengths,
+        retest=None if tested is None else tested.retest,
         level=options.level,
-        nulls=bank.words,
+        nulls=nulls,
         proposed_from=data_hash(prepared.projected.segments),
         tested_on=data_hash(untouched),
-        known=tuple(column.name for column in acting_columns),
+        known=tuple(prepared.effect(column).name for column in prepared.acting),
         seed=options.seed,
     )
 
@@ -390,6 +243,12 @@ class _Prepared:
     def effect(self, column: int) -> EffectColumn:
         """Returns the effect of a column."""
         return self.effects[column - len(THETA)]
+
+    def search(self, *, level: float) -> tuple[Step, ...]:
+        """Takes candidates one after the other, while another one is significant."""
+        return search(
+            self.evidence, self.family, self.labels, self.pool, acting=self.acting, level=level
+        )
 
     def fit(self, columns: Sequence[int]) -> FittedModel:
         """Fits the model that has the effects of these columns."""

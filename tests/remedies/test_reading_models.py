@@ -74,7 +74,9 @@ def monday(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_film_is_read_by_the_model_that_was_calibrated(
     user: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said = user.meets("commands/calibrate_recordings.py", "agdata measure: --model", *CALIBRATE, "garden")
+    said = user.meets(
+        "commands/calibrate_recordings.py", "agdata measure: --model", *CALIBRATE, "garden"
+    )
     assert said.endswith("--model garden")
     command = ("measure", "monday", "--model", "garden")
     user.follows(*command, shows=READ)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.core.findings import Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError
 from flagdata.lake import (
     Artifact,
@@ -86,12 +87,12 @@ def put_folder(lake: Lake, text: str, *, parents: tuple[str, ...] = ()) -> Artif
         for k in range(3):
             (staged / "c" / str(k)).write_text(f"{text} {k}")
         row = Artifact(
-            kind="meshes",
+            kind=Kind.MESHES,
             name=text,
             object=transaction.put(staged),
             recipe={"of": text},
             parents=parents,
-        )  # type: ignore[arg-type]
+        )
         transaction.add(row)
     return row
 
@@ -332,7 +333,7 @@ def test_a_push_that_was_killed_at_any_step_names_the_push_that_heals(
             lake.delete_branch(f"side-{at - 1}", discard=True)
         calls = stopped(
             monkeypatch, owner, method, lambda c=copy: transfer(lake, c, bars=no_bar), at=at
-        )  # type: ignore[misc]
+        )
         for finding in (*doctor(copy), *verify_catalog(copy)):
             assert finding.severity is not Severity.ERROR or "flagdata push or pull" in str(
                 finding.fix

@@ -13,7 +13,7 @@ import pytest
 from flagdata.errors import CorruptError, InputError
 from measure.forecasting import Segments
 from measure.propose import Decision, ProposalOutcome, proposal_log
-from measure.propose.term_search import data_hash, split
+from measure.propose.proposal_split import data_hash, split
 from measure.trajectories import Trajectory, WindTrack
 from tests.golden_answers import changes
 

@@ -252,7 +252,7 @@ def _stressed() -> list[Design]:
             one,
             name=f"stressed-w{one.run[-1]}-{name.replace(' ', '-').replace('%', 'percent')}",
             **change,
-        )  # type: ignore[arg-type]
+        )
         for one in base
         for name, change in STRESSORS.items()
     ]
