@@ -154,10 +154,58 @@ class Quantity:
         """What people call it."""
         return self.name.replace("_", " ") if self.form is None else self.form.title
 
+    @classmethod
+    def of(
+        cls,
+        value: float,
+        low: float,
+        high: float,
+        *,
+        unit: str,
+        level: float = 0.9,
+        bound: Bound | None = None,
+        name: str = "",
+    ) -> Quantity:
+        """Makes a quantity of a value with its interval, or of a bound.
+
+        Args:
+            value: NaN of one that was not found; of a bound what it is.
+            low, high: ends of the interval; of a bound one is infinite, or where the quantity ends.
+            level: probability that the interval, or the bound, holds.
+            bound: which side is known where only one is, or neither.
+            name: empty where what the quantity is part of names it.
+        """
+        return cls(
+            name=name,
+            unit=unit,
+            value=None if bound in (Bound.LEAST, Bound.MOST) else value,
+            sigma=None,
+            span=Span(low=low, high=high, level=level, bound=bound, estimated=bound is None),
+            constrained=bound is not Bound.NOTHING,
+        )
+
+    @property
+    def point(self) -> float:
+        """One number for it: its value, or what it is at least or at most; NaN where there is
+        neither."""
+        if self.is_bound:
+            return self.low if self.bound is Bound.LEAST else self.high
+        return math.nan if self.value is None else self.value
+
+    @property
+    def low(self) -> float:
+        """The lower end of its interval, of a bound infinite or where the quantity ends."""
+        return self.span.low
+
+    @property
+    def high(self) -> float:
+        """The upper end likewise."""
+        return self.span.high
+
     @property
     def interval(self) -> tuple[float, float]:
         """Its ends, of a bound one at infinity or where the quantity ends."""
-        return self.span.low, self.span.high
+        return self.span.interval
 
     @property
     def level(self) -> float:

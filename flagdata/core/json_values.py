@@ -27,11 +27,17 @@ def finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def json_values(value: Any, *, number: Callable[[float], Any] = finite) -> Any:
+def json_values(
+    value: Any,
+    *,
+    number: Callable[[float], Any] = finite,
+    names: Mapping[type, tuple[str, ...]] | None = None,
+) -> Any:
     """Returns a value as JSON has it: objects, lists, texts, numbers, true, false and null.
 
     Args:
         number: how a floating-point number is written.
+        names: of types that a document states otherwise than its `JSON_NAMES`.
 
     Raises:
         TypeError: a type that JSON has no form of.
@@ -51,16 +57,18 @@ def json_values(value: Any, *, number: Callable[[float], Any] = finite) -> Any:
             return value.isoformat()
         case Mapping():
             return {
-                str(json_values(key)): json_values(one, number=number) for key, one in value.items()
+                str(json_values(key)): json_values(one, number=number, names=names)
+                for key, one in value.items()
             }
         case list() | tuple():
-            return [json_values(one, number=number) for one in value]
+            return [json_values(one, number=number, names=names) for one in value]
         case _ if callable(listed := getattr(value, "tolist", None)):  # of numpy, not loaded for it
             return json_values(listed(), number=number)
-        case _ if names := _names(value):
+        case _ if paths := _paths(value, names or {}):
             optional = getattr(type(value), "JSON_OPTIONAL", ())
             entries = (
-                (key, json_values(_part(value, path), number=number)) for key, path in names.items()
+                (key, json_values(_part(value, path), number=number, names=names))
+                for key, path in paths.items()
             )
             return {
                 key: one
@@ -71,11 +79,12 @@ def json_values(value: Any, *, number: Callable[[float], Any] = finite) -> Any:
             raise TypeError(f"JSON has no form of {type(value).__name__}")
 
 
-def _names(value: Any) -> dict[str, str]:
+def _paths(value: Any, names: Mapping[type, tuple[str, ...]]) -> dict[str, str]:
     """Lists what JSON states of a value of a type with `JSON_NAMES` or of a dataclass: key →
     path."""
-    if names := getattr(type(value), "JSON_NAMES", None):
-        return {key: path or key for key, _, path in (name.partition("=") for name in names)}
+    kind = type(value)
+    if stated := names.get(kind) or getattr(kind, "JSON_NAMES", None):
+        return {key: path or key for key, _, path in (name.partition("=") for name in stated)}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {one.name: one.name for one in dataclasses.fields(value)}
     return {}

@@ -11,7 +11,7 @@ from measure.closing.joint_verdict import Joint
 from measure.report import verdict_cells as cells
 from measure.report.document import plain
 from measure.report.lead_sentences import say_strength
-from measure.report.verdict_answer import TONES, quantity_of
+from measure.report.verdict_answer import TONES
 from measure.report.verdict_sections import GLOSSARY_ANCHOR, glossary_section
 from measure.report.verdict_sentences import list_names, shorten_list
 from measure.verdict.criteria import CRITERIA
@@ -25,7 +25,7 @@ def joint_answer(joint: Joint, by_markers: Closed, by_films: Closed) -> Closed:
     """Makes the answer of both kinds of recordings: one page with the sections of both."""
     answers: dict[str, Closed] = dict(zip(KINDS, (by_markers, by_films), strict=True))
     strengths = {
-        one.name: quantity_of(one.name, one.together)
+        one.name: replace(one.together, name=one.name)
         for one in joint.strengths
         if one.together is not None
     }

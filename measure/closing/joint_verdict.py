@@ -20,10 +20,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from flagdata.answer import Quantity
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import estimate_text, known, number, probability, with_level
-from measure.verdict.verdict_record import Conclusion, Estimate, Verdict
+from measure.verdict.verdict_record import Conclusion, Verdict
 
 _CERTAIN = 0.02
 """Least standard error of a logarithm: no kind knows more."""
@@ -41,9 +42,9 @@ class Combined:
     """
 
     name: str
-    markers: Estimate | None
-    films: Estimate | None
-    together: Estimate | None
+    markers: Quantity | None
+    films: Quantity | None
+    together: Quantity | None
     apart: float | None
 
 
@@ -106,7 +107,7 @@ def join_verdicts(
         for name in (rejecting[0].named if rejecting else ())
         if all(name in verdict.named for verdict in rejecting)
     )
-    p = min([1.0, *(len(verdicts) * verdict.test.p_value.value for verdict in tested)])
+    p = min([1.0, *(len(verdicts) * verdict.test.p_value.point for verdict in tested)])
     strengths = [_strength(name, markers, films) for name in effects]
     return Joint(
         conclusion=_conclusion(tested, rejecting, effects),
@@ -161,7 +162,7 @@ def _cloth(markers: Verdict, films: Verdict, nominal: Mapping[str, float]) -> tu
             )
             by_markers = None if of_markers is None else getattr(of_markers, moment)
             factor = nominal.get(parameter.name, 1.0)
-            of_films: Estimate | None = getattr(parameter, moment)
+            of_films: Quantity | None = getattr(parameter, moment)
             if by_markers is not None and of_films is not None:
                 by_markers = _times(by_markers, factor, of_films.unit)
             label = parameter.name.replace("_", " ")
@@ -172,9 +173,9 @@ def _cloth(markers: Verdict, films: Verdict, nominal: Mapping[str, float]) -> tu
     return tuple(combined)
 
 
-def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
-    return Estimate(
-        value=estimate.value * factor,
+def _times(estimate: Quantity, factor: float, unit: str) -> Quantity:
+    return Quantity.of(
+        value=estimate.point * factor,
         low=estimate.low * factor,
         high=estimate.high * factor,
         unit=unit,
@@ -184,8 +185,8 @@ def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
 
 def _multiply_likelihoods(
     name: str,
-    markers: Estimate | None,
-    films: Estimate | None,
+    markers: Quantity | None,
+    films: Quantity | None,
     *,
     shared: float = 0.0,
     null: float = 0.0,
@@ -210,7 +211,7 @@ def _multiply_likelihoods(
         )
         return Combined(name=name, markers=markers, films=films, together=only, apart=None)
     first, second = usable
-    if (first.value - null) * (second.value - null) < 0:
+    if (first.point - null) * (second.point - null) < 0:
         return Combined(name=name, markers=markers, films=films, together=None, apart=math.inf)
     means, variances = zip(*(_logarithm(estimate, null) for estimate in usable), strict=True)
     own_variances = [max(variance - shared**2, _CERTAIN**2) for variance in variances]
@@ -219,20 +220,20 @@ def _multiply_likelihoods(
     )
     sigma = math.sqrt(1 / sum(1 / v for v in own_variances) + shared**2)
     ends = [math.exp(mean + side * CRITERIA.reach * sigma) for side in (-1, 0, 1)]
-    sign = 1 if first.value > null else -1
+    sign = 1 if first.point > null else -1
     low, value, high = sorted(null + sign * end for end in ends)
     return Combined(
         name=name,
         markers=markers,
         films=films,
         apart=abs(means[0] - means[1]) / math.sqrt(sum(own_variances)),
-        together=Estimate(
+        together=Quantity.of(
             value=value, low=low, high=high, unit=second.unit, level=CRITERIA.interval
         ),
     )
 
 
-def _is_one_sided(estimate: Estimate, null: float) -> bool:
+def _is_one_sided(estimate: Quantity, null: float) -> bool:
     """Returns whether an interval is finite and on one side of the null value."""
     return (
         math.isfinite(estimate.low)
@@ -241,15 +242,15 @@ def _is_one_sided(estimate: Estimate, null: float) -> bool:
     )
 
 
-def _logarithm(estimate: Estimate, null: float) -> tuple[float, float]:
+def _logarithm(estimate: Quantity, null: float) -> tuple[float, float]:
     """Computes mean and variance of the logarithm of the distance from the null value."""
     ends = sorted(math.log(abs(end - null)) for end in (estimate.low, estimate.high))
-    return math.log(abs(estimate.value - null)), ((ends[1] - ends[0]) / (2 * CRITERIA.reach)) ** 2
+    return math.log(abs(estimate.point - null)), ((ends[1] - ends[0]) / (2 * CRITERIA.reach)) ** 2
 
 
 def _sentences(joint: Joint) -> list[str]:
     p_values = ", ".join(
-        f"p = {probability(verdict.test.p_value.value)} by {kind}"
+        f"p = {probability(verdict.test.p_value.point)} by {kind}"
         for kind, verdict in (("markers", joint.markers), ("films", joint.films))
     )
     test = (

@@ -84,7 +84,7 @@ def acting(verdict: Verdict) -> tuple[Candidate, ...]:
 def fitted_parameters(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
     """Parameters of the cloth, calibrated with the effects where there are any, by their names."""
     return {
-        p.name: (p.after if effects and p.after is not None else p.before).value
+        p.name: (p.after if effects and p.after is not None else p.before).point
         for p in verdict.parameters
     }
 
@@ -98,7 +98,7 @@ def acting_effects(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str
         described = kind.parameters()[candidate.parameter]
         of_effect = strengths.setdefault(candidate.effect, {})
         of_effect[candidate.parameter.replace("_", "-")] = described.nearest(
-            candidate.strength.value
+            candidate.strength.point
         )
         of_effect.update(kind.weighed_shapes)
     return {"effects": strengths} if strengths else {}

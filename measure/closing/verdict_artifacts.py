@@ -206,9 +206,9 @@ def fingerprint(experiment: Experiment) -> str:
 
 def _measurement(closed: ClosedLoop) -> Artifact:
     verdict = closed.verdict
-    fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
+    fitted = {p.name: (p.after or p.before).point for p in verdict.parameters}
     fitted |= {
-        f"{c.effect}.{c.parameter}": c.strength.value
+        f"{c.effect}.{c.parameter}": c.strength.point
         for c in closed.effects
         if c.strength.bound is None
     }
@@ -217,7 +217,7 @@ def _measurement(closed: ClosedLoop) -> Artifact:
         "conclusion": verdict.conclusion.value,
         "named": list(verdict.named),
         "words": verdict.words,
-        "p_value": verdict.test.p_value.value,
+        "p_value": verdict.test.p_value.point,
         "separating": verdict.separating,
         "findings": json_values(closed.findings),
     }

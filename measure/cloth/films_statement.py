@@ -161,7 +161,7 @@ def error_text(comparison: Comparison, after: str) -> str:
     if known(comparison.control):
         parts.append(f"{estimate_text(comparison.control)} with {comparison.control_name} instead")
     unit = "" if comparison.floor.unit == "1" else f" {comparison.floor.unit}"
-    parts.append(f"replicates scatter by {number(comparison.floor.value, digits=2)}{unit}")
+    parts.append(f"replicates scatter by {number(comparison.floor.point, digits=2)}{unit}")
     return "; ".join([*parts, f"n = {comparison.frames} windows"])
 
 

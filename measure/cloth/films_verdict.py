@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
-from flagdata.answer import Bound
+from flagdata.answer import Bound, Quantity
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
 from flagdata.core.json_values import json_values
@@ -42,7 +42,7 @@ from measure.forecasting.strengths import what_copies, why_unweighed
 from measure.posterior_ends import span
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.verdict_record import Candidate, Estimate, NullTest, Parameter, Power, Verdict
+from measure.verdict.verdict_record import Candidate, NullTest, Parameter, Power, Verdict
 
 SEEN = 2.0
 """Standard errors below which even a strong effect is not seen."""
@@ -148,7 +148,7 @@ def _test(outcome: SolvedLoop) -> NullTest:
         null=nulls.null.tolist(),
         kinds=nulls.count,
         level=level,
-        p_value=Estimate(
+        p_value=Quantity.of(
             value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval
         ),
         critical=nulls.critical(level),
@@ -197,7 +197,7 @@ def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
                 after=None if later is None else later[0],
                 shift=None
                 if later is None
-                else (later[0].value - before[number][0].value) / before[number][1],
+                else (later[0].point - before[number][0].point) / before[number][1],
             )
         )
     return tuple(parameters)
@@ -205,20 +205,20 @@ def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
 
 def _cloths(
     outcome: SolvedLoop, effect: Weighable | None, fit: Fit
-) -> list[tuple[Estimate, float]]:
+) -> list[tuple[Quantity, float]]:
     cloth, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
     return [_marginal(cloth[quantity.name], fit.weights[0], quantity.unit) for quantity in CLOTH]
 
 
-def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estimate, float]:
+def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Quantity, float]:
     tail = (1 - CRITERIA.interval) / 2
     low, middle, high = quantiles(values, weights, (tail, 0.5, 1 - tail))
     mean = float(weights @ values)
     sigma = float(np.sqrt(weights @ np.square(values - mean)))
-    return Estimate(value=middle, low=low, high=high, unit=unit, level=CRITERIA.interval), sigma
+    return Quantity.of(value=middle, low=low, high=high, unit=unit, level=CRITERIA.interval), sigma
 
 
-def strength_of(effect: Weighable, fit: Fit) -> Estimate:
+def strength_of(effect: Weighable, fit: Fit) -> Quantity:
     """Estimates a strength, its interval widened by what meshes and cloths do to effects, as on
     trajectories; a bound where the posterior leans on an end of what is assumed of it
     (`measure.posterior_ends`)."""
@@ -230,10 +230,10 @@ def strength_of(effect: Weighable, fit: Fit) -> Estimate:
     marginal, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
     if (bound := _bound(effect, strengths, shares, fit.weights[0], factor=factor)) is not None:
         return bound
-    value, size, null = marginal.value, abs(marginal.value), effect.column.described.null
+    value, size, null = marginal.point, abs(marginal.point), effect.column.described.null
     inward, outward = size * (1 - 1 / factor), size * (factor - 1)
     below, above = (inward, outward) if value > 0 else (outward, inward)
-    return Estimate(
+    return Quantity.of(
         value=null + value,
         low=null + value - float(np.hypot(below, value - marginal.low)),
         high=null + value + float(np.hypot(above, marginal.high - value)),
@@ -249,7 +249,7 @@ def _bound(
     weights: FloatArray,
     *,
     factor: float,
-) -> Estimate | None:
+) -> Quantity | None:
     """Returns a strength that is known on one side only; None of one with two ends.
 
     Args:
@@ -284,13 +284,13 @@ def _bound(
     ends = {Bound.LEAST: (wider, interval.high), Bound.MOST: (interval.low, wider)}.get(
         interval.bound, (interval.low, interval.high)
     )
-    return Estimate(
+    return Quantity.of(
         value=null + (end if interval.bound is Bound.NOTHING else wider),
         low=null + ends[0],
         high=null + ends[1],
         unit=effect.column.unit,
         level=interval.level,
-        bound=interval.bound.value,
+        bound=interval.bound,
     )
 
 

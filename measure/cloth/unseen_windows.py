@@ -15,6 +15,7 @@ from itertools import permutations
 
 import numpy as np
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
 from flagdata.core.rng import stream
@@ -27,7 +28,7 @@ from measure.cloth.observed_recording import LEAST_WINDOWS, Observed
 from measure.cloth.simulations import Simulations, of_recordings, part_of, sights_of
 from measure.observables import OBSERVABLES
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Comparison, Estimate
+from measure.verdict.verdict_record import Comparison
 
 _DRAWS = 500
 
@@ -275,7 +276,7 @@ def _comparison(
         before=error_before,
         after=_estimate(after, unit),
         reduction=_estimate(reduction, unit),
-        floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
+        floor=Quantity.of(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
         share=None
         if reduction is None or error_before.low <= floor
         else reduction[0] / (before[0] - floor),
@@ -284,14 +285,14 @@ def _comparison(
     )
 
 
-def _estimate(value_and_draws: tuple[float, FloatArray] | None, unit: str) -> Estimate:
+def _estimate(value_and_draws: tuple[float, FloatArray] | None, unit: str) -> Quantity:
     if value_and_draws is None:
-        return Estimate(
+        return Quantity.of(
             value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval
         )
     value, draws = value_and_draws
     tails = [(1 - CRITERIA.interval) / 2, (1 + CRITERIA.interval) / 2]
     low, high = np.quantile(draws, tails).tolist()
-    return Estimate(
+    return Quantity.of(
         value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval
     )

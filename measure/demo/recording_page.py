@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 import flagdata
 from flagdata.align.session_chart import HEIGHTS, session_panels
+from flagdata.answer import Quantity
 from flagdata.answer.answer import Answer, Figure, Gallery, Head, Section, Table, Tone
 from flagdata.answer.charts import Axis, Band, Chart, Colour, Line, Panel
 from flagdata.core.clock_model import NINETY, ClockModel
@@ -42,19 +43,22 @@ _ABOUT_MOTION = (
 class Recovered:
     """The clock offset found against the hidden one; seconds."""
 
-    offset: float
-    low: float
-    high: float
+    offset: Quantity
     confidence: float
     truth: float
 
     @property
     def error(self) -> float:
-        return abs(self.offset - self.truth)
+        return abs(self.offset.point - self.truth)
 
     @property
     def covered(self) -> bool:
-        return self.low <= self.truth <= self.high
+        return self.offset.low <= self.truth <= self.offset.high
+
+    @property
+    def text(self) -> str:
+        """The offset with its interval, without its level."""
+        return f"{self.offset.point:+.2f} s [{self.offset.low:+.2f}, {self.offset.high:+.2f}]"
 
 
 def recording_answer(
@@ -82,8 +86,8 @@ def recording_answer(
             facts={
                 "film": f"{minutes:.2g} min from {iso(first)[:16]}Z, a "
                 f"simulated flag of {SIZE.replace('x', ' m × ')} m",
-                "clock": f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}], 90 %, "
-                f"truly {clock.truth:+.2f} s; confidence {clock.confidence:.3f}",
+                "clock": f"{clock.text}, {clock.offset.span.percent}, truly {clock.truth:+.2f} s; "
+                f"confidence {clock.confidence:.3f}",
                 "log": f"a cup anemometer, {len(logged.time)} one-second means",
             },
             limits=["The gap in the log and the stretch in which it stuck are left out of means."],
@@ -94,12 +98,12 @@ def recording_answer(
 
 def _sentence(clock: Recovered) -> str:
     """Says how the clocks differ, and whether that holds the truth."""
-    side = "ahead of" if clock.offset > 0 else "behind"
+    side = "ahead of" if clock.offset.point > 0 else "behind"
     holds = "holds" if clock.covered else "does not hold"
     return (
-        f"The log's clock is {abs(clock.offset):.1f} s {side} the camera's; the 90 % interval "
-        f"{holds} "
-        "the truth, which is in neither file."
+        f"The log's clock is {abs(clock.offset.point):.1f} s {side} the camera's; the 90 % "
+        f"interval {holds} the truth, "
+        "which is in neither file."
     )
 
 
@@ -156,9 +160,7 @@ def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
     offset = (int(clock.to_common(device)) - device) / NANOSECONDS
     half = NINETY * float(clock.sigma(device))
     return Recovered(
-        offset=offset,
-        low=offset - half,
-        high=offset + half,
+        offset=Quantity.of(offset, offset - half, offset + half, unit="s", name="clock_offset"),
         confidence=clock.confidence,
         truth=truth,
     )

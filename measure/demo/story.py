@@ -328,7 +328,7 @@ def _align_step(shell: Transcript, recording: Recording) -> None:
             "the log's clock minus the camera's",
             f"{clock.truth:+.2f} s",
             Judgement.GIVEN if estimated is None else inferred,
-            inferred=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %",
+            inferred=f"{clock.text} {clock.offset.span.percent}",
         )
 
 

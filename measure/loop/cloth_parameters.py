@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray
 from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.loop.gauss_newton import Refined
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.verdict_record import (
-    Estimate,
     Parameter,
 )
 
@@ -58,7 +58,7 @@ def parameters(
 
 def _estimate(
     name: str, calibration: Calibration, half: float, area_weight_uncertainty: float
-) -> Estimate:
+) -> Quantity:
     """Estimates a parameter with its interval, of half the width `half` in its logarithm by this
     code alone.
 
@@ -77,7 +77,7 @@ def _estimate(
     half_width = min(
         math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * prior_uncertainty)
     )
-    return Estimate(
+    return Quantity.of(
         value=value,
         low=value * math.exp(-half_width),
         high=value * math.exp(half_width),
@@ -86,11 +86,11 @@ def _estimate(
     )
 
 
-def _damping(value: float, half: float) -> Estimate:
+def _damping(value: float, half: float) -> Quantity:
     """Estimates damping [s]: what codes differ by is like so much more or less of it, and where a
     fit ends is a factor beside; none lies below 0."""
     between = CRITERIA.reach * CRITERIA.damping_between
     half_width = math.hypot(half, CRITERIA.reach * CRITERIA.damping_factor)
     low = value - math.hypot(value - value * math.exp(-half_width), between)
     high = value + math.hypot(value * math.exp(half_width) - value, between)
-    return Estimate(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)
+    return Quantity.of(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)

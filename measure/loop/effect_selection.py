@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.calibrated_parameters import THETA
 from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
@@ -41,7 +42,7 @@ from measure.probes.wind_course import ALONG, Variation
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import undecided_sentences
 from measure.verdict.quantity import number
-from measure.verdict.verdict_record import Candidate, Conclusion, Estimate
+from measure.verdict.verdict_record import Candidate, Conclusion
 from sim.effects import EFFECTS
 
 GUST_COLUMN = -1
@@ -49,10 +50,10 @@ GUST_COLUMN = -1
 _FIRST = len(THETA)
 
 
-def equivalent(effect: str, strength: Estimate) -> tuple[str, ...]:
+def equivalent(effect: str, strength: Quantity) -> tuple[str, ...]:
     """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth
     scale the dynamic pressure as the air's density does, but only lower it."""
-    return ("porosity",) if effect == "air-density" and strength.value < 0 else ()
+    return ("porosity",) if effect == "air-density" and strength.point < 0 else ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +86,7 @@ class LibraryJudgement:
     test: BaseModelTest
     line: SpectralLine | None = None
     course: Variation | None = None
-    direction: Estimate | None = None
+    direction: Quantity | None = None
     departed: tuple[int, ...] = ()
     power: tuple[tuple[Sought, float], ...] = ()
     open: tuple[str, ...] = ()
@@ -249,7 +250,7 @@ def _departure(evidence: Evidence, reference: Reference) -> float:
     return 0.0 if settles is None else float(np.sqrt(np.square(settles).mean()))
 
 
-def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weighed:
+def _within(turned_wind: Weighed, direction: Quantity, tolerance: float) -> Weighed:
     """Describes the turned wind as it was measured; no effect where the log's tolerance allows for
     it."""
     inside = tolerance > 0 and not beyond_tolerance(direction, tolerance)
@@ -558,7 +559,7 @@ def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
     if not candidate.admissible:
         strength = candidate.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
-        return f"the fitted value is unphysical: {number(strength.value)}{unit}"
+        return f"the fitted value is unphysical: {number(strength.point)}{unit}"
     if not _leads(candidate.gains, 0 * candidate.gains, candidate.recording):
         return "it predicts unseen recordings no better than the base model"
     if _leads(best.gains, candidate.gains, candidate.recording):

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from torch import Tensor
 
-from flagdata.answer import Bound, Span
+from flagdata.answer import Bound, Quantity, Span
 from flagdata.core.arrays import BoolArray, FloatArray
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.model import Model, errors_of
@@ -38,7 +38,6 @@ from measure.nulls.null_simulation import FreeRunDivergedError
 from measure.nulls.reference import Reference
 from measure.posterior_ends import of_profile
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Estimate
 from sim.effects.parameter import Parameter
 
 COUNT = 16
@@ -66,7 +65,7 @@ class Profile:
     sign: int
     misfit: FloatArray
 
-    def estimate(self, *, larger: float) -> Estimate | None:
+    def estimate(self, *, larger: float) -> Quantity | None:
         """Estimates the strength as a bound; None where the profile has two ends, and the fit says
         more, or where strengths of the other sign lie beyond an end.
 
@@ -96,13 +95,13 @@ class Profile:
         low, high = sorted(null + self.sign * end for end in ends)
         turned = {Bound.LEAST: Bound.MOST, Bound.MOST: Bound.LEAST}
         bound = span.bound if self.sign > 0 else turned.get(span.bound, span.bound)
-        return Estimate(
+        return Quantity.of(
             value=null + self.sign * size,
             low=low,
             high=high,
             unit=unit,
             level=span.level,
-            bound=bound.value,
+            bound=bound,
         )
 
     def span(self, *, larger: float) -> Span:

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.json_values import json_values
 from flagdata.core.provenance import code_version
@@ -72,7 +73,6 @@ from measure.verdict.verdict_record import (
     Candidate,
     Comparison,
     Conclusion,
-    Estimate,
     NullTest,
     Parameter,
     Power,
@@ -278,7 +278,7 @@ class Solved:
             columns_named if self.judgement.conclusion is Conclusion.EFFECT else columns_named[:1]
         )
 
-    def strength(self, ranked: Weighed, larger: Refined) -> Estimate:
+    def strength(self, ranked: Weighed, larger: Refined) -> Quantity:
         """Estimates the strength of an acting effect beyond the linear: its error exceeds what Σ
         says as where it is linear."""
         index = self.acting.index(ranked.column)
@@ -488,8 +488,8 @@ def _direction(judgement: LibraryJudgement) -> tuple[Parameter, ...]:
     angle = judgement.direction
     if angle is None:
         return ()
-    value, low, high = (math.degrees(v) for v in (angle.value, angle.low, angle.high))
-    in_degrees = Estimate(value=value, low=low, high=high, unit="°", level=angle.level)
+    value, low, high = (math.degrees(v) for v in (angle.point, angle.low, angle.high))
+    in_degrees = Quantity.of(value=value, low=low, high=high, unit="°", level=angle.level)
     return (
         Parameter(
             name="direction of the wind from its log, counter-clockwise",
@@ -516,7 +516,9 @@ def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
         statistic=tested.statistic,
         null=[float(v) for v in conformal.null],
         kinds=conformal.count,
-        p_value=Estimate(value=tested.p, low=low, high=high, unit="1", level=CRITERIA.interval),
+        p_value=Quantity.of(
+            value=tested.p, low=low, high=high, unit="1", level=CRITERIA.interval
+        ),
         level=level,
         critical=conformal.critical(level),
         nulls=bank.words,

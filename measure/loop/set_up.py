@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flagdata.answer import Quantity
 from measure.forecasting.regressors import TURNED, names
 from measure.inference.segment_evidence import Evidence
 from measure.nulls.reference import Reference
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Estimate
 
 HOIST = "full-hoist.stiffness"
 
@@ -28,7 +28,7 @@ class SetUp:
     attached: bool = False
 
 
-def wind_turn(evidence: Evidence, reference: Reference) -> Estimate | None:
+def wind_turn(evidence: Evidence, reference: Reference) -> Quantity | None:
     """Estimates by how much the wind is turned from where its logs have it, counter-clockwise
     [rad], whatever their tolerance; None in still air, which has no direction."""
     column, undirected = names().index(TURNED), evidence.with_directions()
@@ -37,12 +37,12 @@ def wind_turn(evidence: Evidence, reference: Reference) -> Estimate | None:
     value, _ = undirected.fit([column]).of(column)
     error = abs(value) / math.sqrt(max(float(reference.statistics(undirected)[column]), 1e-12))
     half = reference.reach_of(column) * error
-    return Estimate(
+    return Quantity.of(
         value=value, low=value - half, high=value + half, unit="rad", level=CRITERIA.interval
     )
 
 
-def beyond_tolerance(direction: Estimate | None, tolerance: float) -> bool:
+def beyond_tolerance(direction: Quantity | None, tolerance: float) -> bool:
     """Returns whether all of the interval lies beyond a tolerance; never of a log whose direction
     is declared exactly, which is tested as every other effect is."""
     return (

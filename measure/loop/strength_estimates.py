@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2, norm
 
+from flagdata.answer import Quantity
 from measure.inference.segment_evidence import Evidence
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Candidate, Estimate
+from measure.verdict.verdict_record import Candidate
 
 
-def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
+def heterogeneity(strengths: Sequence[Quantity]) -> float | None:
     """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101,
     1954); None of fewer than two.
 
@@ -25,7 +26,7 @@ def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
     """
     if len(strengths) < 2:
         return None
-    values = np.array([s.value for s in strengths])
+    values = np.array([s.point for s in strengths])
     errors = np.array([(s.high - s.low) / 2 / norm.ppf(0.5 + s.level / 2) for s in strengths])
     weights = errors**-2.0
     common = (weights * values).sum() / weights.sum()
@@ -46,7 +47,7 @@ def strengths_by_recording(
     about: float,
     larger: float,
     unit: str,
-) -> tuple[Estimate, ...]:
+) -> tuple[Quantity, ...]:
     """Estimates the strength of a column in each recording alone, where some columns are fitted to
     it.
 
@@ -54,14 +55,14 @@ def strengths_by_recording(
         about: the strength in the model that the evidence is of.
         larger: by how much its standard errors are larger than Σ says.
     """
-    strengths: list[Estimate] = []
+    strengths: list[Quantity] = []
     for index in np.unique(evidence.recording):
         value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
         strengths.append(estimate(about + value, larger * claimed, unit))
     return tuple(strengths)
 
 
-def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
+def strength(null: float, coefficient: float, error: float, unit: str) -> Quantity:
     """Estimates the strength of an effect, by its coefficient beyond null and the standard error
     that nulls leave.
 
@@ -73,14 +74,14 @@ def strength(null: float, coefficient: float, error: float, unit: str) -> Estima
     outward = math.hypot(coefficient * (math.exp(factor) - 1), reach)
     low, high = (outward, inward) if coefficient < 0 else (inward, outward)
     value = null + coefficient
-    return Estimate(
+    return Quantity.of(
         value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval
     )
 
 
-def estimate(value: float, error: float, unit: str) -> Estimate:
+def estimate(value: float, error: float, unit: str) -> Quantity:
     """Computes a normal interval at the level of all intervals."""
-    return Estimate(
+    return Quantity.of(
         value=value,
         low=value - CRITERIA.reach * error,
         high=value + CRITERIA.reach * error,

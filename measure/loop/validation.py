@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from scipy.stats import t as student
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.rng import child_seed
 from measure.forecasting.model import Model, errors_of
@@ -26,7 +27,7 @@ from measure.nulls import tracks, winds
 from measure.nulls.null_simulation import NullBatch
 from measure.trajectories.attachment_anchors import as_seen
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Comparison, Estimate
+from measure.verdict.verdict_record import Comparison
 
 _DURATION = 4.5  # s: two segments of each recording
 _ENOUGH = 3
@@ -61,7 +62,7 @@ class Trial:
     rises: bool = False
 
     @property
-    def control(self) -> Estimate | None:
+    def control(self) -> Quantity | None:
         """Control less after, a segment [nat]; None without a control."""
         return None if self.apart is None else a_segment(self.apart, self.recording)
 
@@ -230,24 +231,24 @@ def share_removed(before: FloatArray, after: FloatArray, floor: FloatArray) -> f
     return float(before.mean() - after.mean()) / above if above > CRITERIA.room * most else None
 
 
-def a_segment(values: FloatArray, recording: IntArray) -> Estimate:
+def a_segment(values: FloatArray, recording: IntArray) -> Quantity:
     """Averages misfits over segments, drawn within recordings, with Student's interval [nat]."""
     value, reach = float(values.mean()), math.inf
     if len(values) > 1:
         free = len(values) - len(_strata(values, recording))
         quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, free))
         reach = quantile * total_error(values, recording) / len(values)
-    return Estimate(
+    return Quantity.of(
         value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval
     )
 
 
-def root(squared: FloatArray) -> Estimate:
+def root(squared: FloatArray) -> Quantity:
     """Computes the root of the mean over segments, with Student's interval of the mean, through the
     root [m]."""
     mean = float(squared.mean())
     reach = _reach(squared)
-    return Estimate(
+    return Quantity.of(
         value=math.sqrt(mean),
         low=math.sqrt(max(mean - reach, 0.0)),
         high=math.sqrt(mean + reach),
@@ -256,12 +257,12 @@ def root(squared: FloatArray) -> Estimate:
     )
 
 
-def paired_difference(before: FloatArray, after: FloatArray) -> Estimate:
+def paired_difference(before: FloatArray, after: FloatArray) -> Quantity:
     """Computes the difference of roots of means, paired by segment: linear in the squares, for
     which Student's interval is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
-    return Estimate(
+    return Quantity.of(
         value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval
     )
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray, IntArray
 from measure.loop.strength_estimates import (
     heterogeneous,
 )
 from measure.loop.validation import total_error
-from measure.verdict.verdict_record import Candidate, Estimate
+from measure.verdict.verdict_record import Candidate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,7 +43,7 @@ class Weighed:
     recording: IntArray
     admissible: bool
     unlike: str = ""
-    measured: Estimate | None = None
+    measured: Quantity | None = None
 
     def passes(self, least: float, level: float) -> bool:
         """Returns whether the model passes its predictive test: no other effect acts beside it at p

@@ -118,7 +118,7 @@ def _part(strength: TermStrength) -> dict[str, Any]:
     term, estimate = Term.named(strength.name), strength.estimate
     reach = abs(estimate.high - estimate.low)
     least, _ = TermColumn.of(term).described.admissible
-    prior = (max(least, min(0.0, estimate.value - reach)), max(0.0, estimate.value + reach))
+    prior = (max(least, min(0.0, estimate.point - reach)), max(0.0, estimate.point + reach))
     return {
         "name": strength.name,
         "field": term.field,
@@ -126,7 +126,7 @@ def _part(strength: TermStrength) -> dict[str, Any]:
         "mass": term.field == MASS,
         "unit": estimate.unit,
         "words": strength.words,
-        "value": f"{estimate.value:.6g}",
+        "value": f"{estimate.point:.6g}",
         "low": f"{estimate.low:.3g}",
         "high": f"{estimate.high:.3g}",
         "level": f"{100 * estimate.level:.0f} %",

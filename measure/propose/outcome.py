@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from flagdata.answer import Quantity
 from measure.propose.search import Step
-from measure.verdict.verdict_record import Estimate
 
 
 class Decision(StrEnum):
@@ -67,7 +67,7 @@ class StrengthCourse:
     bin: float
     times: list[list[float]]
     amplitudes: list[list[float]]
-    by_recording: list[Estimate]
+    by_recording: list[Quantity]
     speeds: list[float]
     fluctuation: float
     lines: list[PeriodogramLine]
@@ -87,7 +87,7 @@ class TermStrength:
 
     name: str
     words: str
-    estimate: Estimate
+    estimate: Quantity
     course: StrengthCourse
 
 
@@ -117,14 +117,14 @@ class Retest:
 
     what: str
     segments: int
-    before: Estimate
-    after: Estimate
-    reduction: Estimate
-    helped: Estimate
-    floor: Estimate
+    before: Quantity
+    after: Quantity
+    reduction: Quantity
+    helped: Quantity
+    floor: Quantity
     share: float | None
-    control: Estimate | None
-    apart: Estimate | None
+    control: Quantity | None
+    apart: Quantity | None
     control_names: tuple[str, ...]
 
     @property
@@ -140,7 +140,7 @@ class Retest:
         if self.apart is None:
             return Decision.KEPT, f"{lower}; there was no term of another direction to compare with"
         wrong = " and ".join(self.control_names)
-        if self.apart.value <= 0:
+        if self.apart.point <= 0:
             return (
                 Decision.REJECTED,
                 f"{lower}, but the same freedom spent on {wrong} lowers it as much",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from flagdata.answer.answer import Cell, Figure, Head, Part, Section, Table, Tone
 from flagdata.answer.charts import Across, Axis, Bars, Chart, Colour, Line, Panel
@@ -10,8 +11,8 @@ from flagdata.answer.proposed import Proposed
 from flagdata.core.json_values import json_values
 from measure.propose.outcome import Decision, ProposalOutcome, Retest, TermStrength
 from measure.propose.proposal_words import words
-from measure.report.verdict_answer import quantity_of
 from measure.verdict.quantity import estimate_text, number, probability
+from measure.verdict.verdict_record import NAMES
 
 _MOST = 14
 _CHART = 620
@@ -39,8 +40,8 @@ def answer_of(outcome: ProposalOutcome, *, subject: str, effect: str) -> Propose
         subject=subject,
         sentence=spoken(outcome),
         tone=Tone.SETTLED if outcome.decision is Decision.KEPT else Tone.MISSED,
-        quantities={one.name: quantity_of(one.name, one.estimate) for one in outcome.strengths},
-        document={"effect": effect, **json_values(outcome)},
+        quantities={one.name: replace(one.estimate, name=one.name) for one in outcome.strengths},
+        document={"effect": effect, **json_values(outcome, names=NAMES)},
         head=Head(
             figures=[] if retest is None else [_errors(retest)],
             facts=facts,
@@ -80,7 +81,7 @@ def _errors(retest: Retest) -> Figure:
     models.append(("numerical floor", retest.floor))
     bars = Bars(
         names=[name for name, _ in models],
-        lengths=[1e3 * one.value for _, one in models],
+        lengths=[1e3 * one.point for _, one in models],
         low=[1e3 * one.low for _, one in models],
         high=[1e3 * one.high for _, one in models],
         colour=Colour.FILM,
@@ -110,7 +111,7 @@ def _sections(outcome: ProposalOutcome) -> list[Section]:
 def _strengths(strengths: Sequence[TermStrength]) -> Section:
     """Makes the section of what was taken, and of how its amplitude goes in time."""
     rows: list[list[Cell]] = [
-        [one.name, one.words, quantity_of(one.name, one.estimate)] for one in strengths
+        [one.name, one.words, replace(one.estimate, name=one.name)] for one in strengths
     ]
     parts: list[Part] = [Table(columns=["term", "what it is", "strength"], rows=rows)]
     for one in strengths:
@@ -118,7 +119,7 @@ def _strengths(strengths: Sequence[TermStrength]) -> Section:
         panels = [
             Panel(
                 marks=[
-                    Across(y=one.estimate.value),
+                    Across(y=one.estimate.point),
                     Line(x=times, y=amplitudes, colour=Colour.FILM),
                 ],
                 title=f"{speed:.1f} m/s",

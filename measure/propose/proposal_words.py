@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from flagdata.answer import Quantity
 from measure.propose.outcome import ProposalOutcome, Retest
-from measure.verdict.verdict_record import Estimate
 
 _NEAREST = 4
 """Further terms that are listed."""
@@ -62,9 +62,9 @@ def _test_sentences(tested: Retest) -> list[str]:
     return lines
 
 
-def interval(estimate: Estimate) -> str:
+def interval(estimate: Quantity) -> str:
     """Formats `value [low, high] unit level`; metres as millimetres."""
     factor, unit = (1e3, "mm") if estimate.unit == "m" else (1.0, estimate.unit)
-    value, low, high = (factor * v for v in (estimate.value, estimate.low, estimate.high))
+    value, low, high = (factor * v for v in (estimate.point, estimate.low, estimate.high))
     unit_text = "" if unit == "1" else f" {unit}"
     return f"{value:.3g} [{low:.3g}, {high:.3g}]{unit_text} {100 * estimate.level:.0f} %"

@@ -12,12 +12,12 @@ import math
 import numpy as np
 from scipy.stats import t as student
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray
 from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.setting import Setting
 from measure.propose.outcome import PeriodogramLine, StrengthCourse
-from measure.verdict.verdict_record import Estimate
 from sim.effects import apply
 
 BIN = 0.2
@@ -86,7 +86,7 @@ def _amplitudes(
     return (top.double().cpu().numpy(), bottom.double().cpu().numpy()), segments.period
 
 
-def _mean(values: FloatArray, unit: str) -> Estimate:
+def _mean(values: FloatArray, unit: str) -> Quantity:
     """Averages, with an interval from blocks of five stretches, which hardly know of one
     another."""
     blocks = (
@@ -96,7 +96,7 @@ def _mean(values: FloatArray, unit: str) -> Estimate:
         student.ppf(0.5 + _LEVEL / 2, len(blocks) - 1) * blocks.std(ddof=1) / math.sqrt(len(blocks))
     )
     value = float(values.mean())
-    return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
+    return Quantity.of(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
 def line(values: FloatArray, period: float) -> PeriodogramLine:
@@ -122,7 +122,7 @@ def line(values: FloatArray, period: float) -> PeriodogramLine:
 
 
 def _words(
-    by_recording: list[Estimate],
+    by_recording: list[Quantity],
     speeds: list[float],
     spread: float,
     lines: list[PeriodogramLine],
@@ -130,7 +130,7 @@ def _words(
 ) -> str:
     unit = "" if by_recording[0].unit == "1" else f" {by_recording[0].unit}"
     means = "; ".join(
-        f"{e.value:+.3g} [{e.low:.3g}, {e.high:.3g}]{unit} at {u:.1f} m/s"
+        f"{e.point:+.3g} [{e.low:.3g}, {e.high:.3g}]{unit} at {u:.1f} m/s"
         for e, u in zip(by_recording, speeds, strict=True)
     )
     text = f"{means}; in time it varies by {spread:.2g}{unit}, errors included"

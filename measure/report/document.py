@@ -16,19 +16,23 @@ import binascii
 import dataclasses
 import math
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from flagdata.answer.quantity import Bound, Quantity
 from flagdata.core.json_values import json_values
 from flagdata.errors import InputError
-from measure.verdict.verdict_record import Verdict
+from measure.verdict.verdict_record import NAMES, Verdict
 
 SCHEMA = "flagdata.verdict/1"
 _SCALARS = {bool: "true or false", int: "a whole number", str: "a text"}
 _MOVING = ("observed", "before", "after")
 _Moving = list[list[list[float]]]
+_QUANTITY = {"value": float, "low": float, "high": float, "unit": str, "level": float}
+_QUANTITY |= {"bound": Bound | None}
+"""Types of what documents state of a quantity."""
 _INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
 
 
@@ -76,7 +80,7 @@ def _current(candidate: Any) -> Any:
 
 def plain(value: Any) -> Any:
     """Returns a value as JSON has it, see `flagdata.core.json_values`, with open ends in words."""
-    return json_values(value, number=_written)
+    return json_values(value, number=_written, names=NAMES)
 
 
 def _written(number: float) -> float | str | None:
@@ -115,6 +119,8 @@ def _read(value: Any, kind: Any, where: str) -> Any:
         return None if value is None else _read(value, present, where)
     if kind == _Moving and isinstance(value, Mapping):
         return _unpack_frames(value, where)
+    if kind is Quantity:
+        return Quantity.of(**_entries(value, _QUANTITY, {"value", "low", "high", "unit"}, where))
     if dataclasses.is_dataclass(kind):
         return _record(value, kind, where)
     if get_origin(kind) in (tuple, list):
@@ -136,13 +142,17 @@ def _read(value: Any, kind: Any, where: str) -> Any:
 
 
 def _record(value: Any, kind: Any, where: str) -> Any:
-    content = _expected_value(value, Mapping, "an object", where)
-    hints = get_type_hints(kind)
     needed = {
         f.name
         for f in dataclasses.fields(kind)
         if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     }
+    return kind(**_entries(value, get_type_hints(kind), needed, where))
+
+
+def _entries(value: Any, hints: Mapping[str, Any], needed: Set[str], where: str) -> dict[str, Any]:
+    """Reads an object of entries of these types, some of which it needs."""
+    content = _expected_value(value, Mapping, "an object", where)
     fix = f"the fields are {', '.join(hints)}"
     if unknown := content.keys() - hints.keys():
         raise InputError(
@@ -150,9 +160,7 @@ def _record(value: Any, kind: Any, where: str) -> Any:
         )
     if lacking := needed - content.keys():
         raise InputError(f"it lacks the field {', '.join(sorted(lacking))}", where=where, fix=fix)
-    return kind(
-        **{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()}
-    )
+    return {name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()}
 
 
 def _sequence(value: Any, kind: Any, where: str) -> Any:

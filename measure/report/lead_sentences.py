@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from flagdata.answer import Bound, Quantity
 from measure.loop.strength_estimates import heterogeneous
 from measure.report.verdict_sentences import (
     candidate_title,
@@ -27,7 +28,7 @@ from measure.verdict.quantity import (
     probability,
     with_level,
 )
-from measure.verdict.verdict_record import Candidate, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.verdict_record import Candidate, Conclusion, NullTest, Verdict
 
 _EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
 """Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology &
@@ -46,7 +47,7 @@ def lead(verdict: Verdict) -> str:
         )
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting_findings(verdict):
         return f"{heading(verdict)}."
-    p = f"p = {probability(verdict.test.p_value.value)}"
+    p = f"p = {probability(verdict.test.p_value.point)}"
     if verdict.conclusion is Conclusion.UNDECIDED:
         return _add_remainder(
             f"Nothing is decided: the base model is not rejected, {p}, but "
@@ -65,7 +66,7 @@ def lead(verdict: Verdict) -> str:
 
 def spoken(verdict: Verdict) -> str:
     """Writes the verdict in a sentence of fewer than 25 words that can be said aloud."""
-    p = f"p = {probability(verdict.test.p_value.value)}"
+    p = f"p = {probability(verdict.test.p_value.point)}"
     match verdict.conclusion:
         case Conclusion.UNTESTED:
             return (
@@ -114,9 +115,9 @@ def _spoken_strength(verdict: Verdict) -> str:
     return say_strength(readable(named[0].parameter), named[0].strength)
 
 
-def say_strength(name: str, strength: Estimate) -> str:
+def say_strength(name: str, strength: Quantity) -> str:
     """Writes "; its coefficient is 0.62 (0.54 to 0.70, 90 %)"; empty where it is not known."""
-    if not known(strength) or strength.bound == "nothing":
+    if not known(strength) or strength.bound is Bound.NOTHING:
         return ""
     value, ends = estimate_parts(strength)
     interval = f"{ends.strip('[]').replace(', ', ' to ')}, " if ends else ""
@@ -131,7 +132,7 @@ def _add_remainder(sentence: str, verdict: Verdict) -> str:
 
 def evidence(test: NullTest) -> str:
     """Words a p, as "moderate evidence": the words for a p."""
-    word = next((word for most, word in _EVIDENCE if test.p_value.value <= most), _NONE)
+    word = next((word for most, word in _EVIDENCE if test.p_value.point <= most), _NONE)
     return f"{word} evidence"
 
 
@@ -139,8 +140,8 @@ def p_text(test: NullTest) -> str:
     """Writes "p = 0.024, could be up to 0.07": with the upper end of the interval that the number
     of nulls leaves."""
     p = test.p_value
-    text = f"p = {probability(p.value)}"
-    return f"{text}, could be up to {probability(p.high)}" if p.high > p.value else text
+    text = f"p = {probability(p.point)}"
+    return f"{text}, could be up to {probability(p.high)}" if p.high > p.point else text
 
 
 def explained_words(verdict: Verdict) -> str:
@@ -151,16 +152,16 @@ def explained_words(verdict: Verdict) -> str:
     floor together. Where none does, of the whole error. Empty where no error after is known.
     """
     compared = [
-        c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0
+        c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.point > 0
     ]
     above = [
         c for c in compared if c.share is not None and not math.isnan(c.share) and known(c.floor)
     ]
-    removed = sum(1 - (c.after.value / c.before.value) ** 2 for c in above or compared)
+    removed = sum(1 - (c.after.point / c.before.point) ** 2 for c in above or compared)
     if compared and removed <= 0:
         return "none of the error on unseen data"
     if above:
-        most = sum(1 - (c.floor.value / c.before.value) ** 2 for c in above)
+        most = sum(1 - (c.floor.point / c.before.point) ** 2 for c in above)
         return (
             f"{number(100 * removed / most, digits=2)} % of the error that a better model could "
             "remove"
@@ -225,7 +226,7 @@ def _strength_words(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
 
 def _strength(verdict: Verdict) -> str:
     test = verdict.test
-    if test.p_value.value > test.level:
+    if test.p_value.point > test.level:
         return (
             f"the set-up is not as declared, and what is left of it is not rejected, {p_text(test)}"
         )
@@ -236,7 +237,7 @@ def _incomplete(verdict: Verdict) -> str:
     """Explains why what is named is not enough."""
     for candidate in verdict.ranking:
         if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
-            strengths = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
+            strengths = ", ".join(number(s.point, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
                 f"fitted to each recording alone it is {strengths}{unit}, which differs by more "

@@ -6,11 +6,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from markupsafe import Markup
 
-from flagdata.answer import Bound, Quantity, Span
 from flagdata.answer.answer import Cell, Figure, Head, Part, Section, Table, Tone
 from flagdata.answer.circumstances import Circumstances, list_circumstances
 from flagdata.answer.closed import Closed
@@ -29,7 +29,7 @@ from measure.report.verdict_words import words
 from measure.trajectories.trajectory import Experiment
 from measure.verdict import quantity
 from measure.verdict.quantity import number, probability
-from measure.verdict.verdict_record import Conclusion, Estimate, Residual, Verdict
+from measure.verdict.verdict_record import Conclusion, Residual, Verdict
 
 TONES = {
     Conclusion.UNTESTED: Tone.OPEN,
@@ -89,10 +89,10 @@ def closed(
         make_sections: makes what follows there.
     """
     strengths = {
-        candidate.effect: quantity_of(candidate.parameter, candidate.strength)
+        candidate.effect: replace(candidate.strength, name=candidate.parameter)
         for candidate in verdict_sentences.named_candidates(verdict)
     }
-    parameters = {one.name: quantity_of(one.name, one.before) for one in verdict.parameters}
+    parameters = {one.name: replace(one.before, name=one.name) for one in verdict.parameters}
     return Closed(
         question="close-loop",
         subject=subject,
@@ -115,27 +115,8 @@ def closed(
         conclusion=verdict.conclusion.value,
         named=verdict.named,
         words=words,
-        p_value=verdict.test.p_value.value,
+        p_value=verdict.test.p_value.point,
         strengths=strengths,
-    )
-
-
-def quantity_of(name: str, estimate: Estimate) -> Quantity:
-    """Makes the quantity that a verdict estimates."""
-    bound = None if estimate.bound is None else Bound(estimate.bound)
-    return Quantity(
-        name=name,
-        unit=estimate.unit,
-        value=estimate.value if bound is None else None,
-        sigma=None,
-        span=Span(
-            low=estimate.low,
-            high=estimate.high,
-            level=estimate.level,
-            bound=bound,
-            estimated=bound is None,
-        ),
-        constrained=bound is not Bound.NOTHING,
     )
 
 
@@ -150,9 +131,9 @@ def errors_figure(verdict: Verdict, *, unseen: str = "data") -> Figure | None:
     if chart is None:
         return None
     shares = [
-        f"{one.what}: {100 * one.after.value / one.before.value:.0f} % {after}"
+        f"{one.what}: {100 * one.after.point / one.before.point:.0f} % {after}"
         for one in verdict.comparisons
-        if quantity.known(one.after) and quantity.known(one.before) and one.before.value > 0
+        if quantity.known(one.after) and quantity.known(one.before) and one.before.point > 0
     ]
     return Figure(
         title=f"Errors in per cent of the base model's: {'; '.join(shares)}",
@@ -165,8 +146,8 @@ def errors_figure(verdict: Verdict, *, unseen: str = "data") -> Figure | None:
 def _weighed(verdict: Verdict) -> dict[str, str]:
     """Returns what the first screen says of the evidence."""
     facts: dict[str, str] = {}
-    if math.isfinite(verdict.test.p_value.value):
-        p = probability(verdict.test.p_value.value)
+    if math.isfinite(verdict.test.p_value.point):
+        p = probability(verdict.test.p_value.point)
         facts["evidence"] = f"{evidence(verdict.test)} that anything is missing, p = {p}"
     if share := explained_words(verdict):
         facts[verdict_sentences.after_label(verdict)] = f"the model explains {share}"

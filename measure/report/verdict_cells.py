@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from markupsafe import Markup, escape
 
+from flagdata.answer import Quantity
 from measure.report import verdict_sentences
 from measure.verdict import quantity
-from measure.verdict.verdict_record import Estimate
 
 
 def estimate_cell(
-    estimate: Estimate | None, display_as: quantity.Display | None = None, *, note: str = ""
+    estimate: Quantity | None, display_as: quantity.Display | None = None, *, note: str = ""
 ) -> Markup:
     """Writes the value over its interval.
 
@@ -20,23 +20,23 @@ def estimate_cell(
     """
     value, ends = quantity.estimate_parts(estimate, display_as=display_as)
     below = Markup('<span class="ends">{}</span>')
-    written = _data(estimate.value if estimate else None, value) + below.format(ends)
+    written = _data(estimate.point if estimate else None, value) + below.format(ends)
     return written + below.format(note) if note else written
 
 
-def full_cell(estimate: Estimate | None) -> Markup:
+def full_cell(estimate: Quantity | None) -> Markup:
     """Writes the value, its interval and the interval's level."""
     value, ends = quantity.estimate_parts(estimate)
     ends_text = f"{ends} {quantity.level_text(estimate.level)}" if estimate and ends else ""
-    number = _data(estimate.value if estimate else None, value)
+    number = _data(estimate.point if estimate else None, value)
     return number + Markup('<span class="ends">{}</span>').format(ends_text)
 
 
-def parameter_cell(estimate: Estimate) -> Markup:
+def parameter_cell(estimate: Quantity) -> Markup:
     """Writes the parameter, unless the data leave it open."""
     text = verdict_sentences.parameter_text(estimate)
     is_plain = text == quantity.with_level(estimate)
-    return full_cell(estimate) if is_plain else _data(estimate.value, text)
+    return full_cell(estimate) if is_plain else _data(estimate.point, text)
 
 
 def number_cell(value: float | None, unit: str = "1") -> Markup:

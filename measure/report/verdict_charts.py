@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 
+from flagdata.answer import Quantity
 from flagdata.answer.charts import (
     Across,
     Axis,
@@ -19,7 +20,7 @@ from flagdata.answer.charts import (
     Shade,
 )
 from measure.verdict.quantity import display, known, number
-from measure.verdict.verdict_record import Candidate, Comparison, Estimate, NullTest, Residual
+from measure.verdict.verdict_record import Candidate, Comparison, NullTest, Residual
 
 NARROW = 5.2
 """Width of a chart that a telephone shows without scrolling [inch]."""
@@ -41,14 +42,14 @@ def errors_chart(comparisons: Sequence[Comparison], *, after: str) -> Chart | No
     Args:
         after: what the model after is called, "with lift".
     """
-    drawn = [c for c in comparisons if known(c.before) and c.before.value > 0 and known(c.after)]
+    drawn = [c for c in comparisons if known(c.before) and c.before.point > 0 and known(c.after)]
     drawn = drawn[:_MOST]
     if not drawn:
         return None
     names = [comparison.what for comparison in drawn]
-    units = [comparison.before.value / 100 for comparison in drawn]
+    units = [comparison.before.point / 100 for comparison in drawn]
 
-    def bars(estimates: Sequence[Estimate], label: str, colour: Colour, offset: float) -> Bars:
+    def bars(estimates: Sequence[Quantity], label: str, colour: Colour, offset: float) -> Bars:
         values = [_value_in(unit, one) for one, unit in zip(estimates, units, strict=True)]
         ends = [_ends_in(unit, one) for one, unit in zip(estimates, units, strict=True)]
         return Bars(
@@ -82,14 +83,14 @@ def errors_chart(comparisons: Sequence[Comparison], *, after: str) -> Chart | No
     return Chart(rows=[[Panel(marks=marks, x=x)]], height=height, width=NARROW)
 
 
-def _value_in(unit: float, estimate: Estimate) -> float:
-    return estimate.value / unit
+def _value_in(unit: float, estimate: Quantity) -> float:
+    return estimate.point / unit
 
 
-def _ends_in(unit: float, estimate: Estimate) -> tuple[float, float]:
+def _ends_in(unit: float, estimate: Quantity) -> tuple[float, float]:
     """Returns the ends of an interval, or the value twice where they are open."""
     ends = estimate.low / unit, estimate.high / unit
-    value = estimate.value / unit
+    value = estimate.point / unit
     shown = ends if all(map(math.isfinite, ends)) else (value, value)
     return min(shown[0], _LONGEST), min(shown[1], _LONGEST)
 
@@ -207,7 +208,7 @@ def _strengths_panel(candidate: Candidate, title: str) -> Panel:
         Across(y=candidate.null, colour=Colour.INK),
         Dots(
             x=[place for place, _ in single],
-            y=[one.value for _, one in single],
+            y=[one.point for _, one in single],
             low=[one.low for _, one in single],
             high=[one.high for _, one in single],
             colour=Colour.INK,

@@ -105,7 +105,7 @@ def _common_unit(comparisons: Sequence[Comparison]) -> quantity.Display | None:
     ]
     if {error.unit for error in errors} != {"m"}:
         return None
-    return quantity.display([e.value for e in errors], "m")
+    return quantity.display([e.point for e in errors], "m")
 
 
 def power_section(verdict: Verdict, how: str) -> Section:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from flagdata.answer import Quantity
 from measure.verdict.decided import NOT_REJECTED, erring, times_floor
 from measure.verdict.quantity import (
     display,
@@ -21,7 +22,6 @@ from measure.verdict.verdict_record import (
     Candidate,
     Comparison,
     Conclusion,
-    Estimate,
     NullTest,
     Verdict,
 )
@@ -153,10 +153,10 @@ def test_sentence(verdict: Verdict) -> str:
     test = verdict.test
     null = [v for v in test.null if math.isfinite(v)]
     p = test.p_value
-    says = "is rejected" if p.value <= test.level else "is not rejected"
+    says = "is rejected" if p.point <= test.level else "is not rejected"
     if test.critical is None:
         says = "cannot be tested"
-    value = "p" if leads_with_p(verdict) else f"p = {probability(p.value)}"
+    value = "p" if leads_with_p(verdict) else f"p = {probability(p.point)}"
     along = (
         f" along {test.suspected} alone, suspected before the recordings were looked at,"
         if test.suspected
@@ -225,7 +225,7 @@ def test_remark(test: NullTest) -> str:
             "possible, so "
             f"that the test could not have rejected the base model at level {test.level:g}."
         )
-    if test.p_value.value > test.level:
+    if test.p_value.point > test.level:
         return "An effect that is too weak to show in these recordings may still act."
     return ""
 
@@ -263,8 +263,8 @@ def control_warnings(verdict: Verdict) -> list[str]:
     """Warns where the wrong effect helps as much as the named one, or hardly less: a sentence for
     all parts of each kind."""
     compared = [c for c in verdict.comparisons if c.apart is not None and known(c.apart)]
-    failing = [c for c in compared if c.apart is not None and c.apart.value <= 0]
-    equal = [c for c in compared if c.apart is not None and c.apart.low <= 0 < c.apart.value]
+    failing = [c for c in compared if c.apart is not None and c.apart.point <= 0]
+    equal = [c for c in compared if c.apart is not None and c.apart.low <= 0 < c.apart.point]
     warnings = []
     if failing:
         text = (
@@ -327,26 +327,26 @@ def reduction_warnings(verdict: Verdict) -> list[str]:
 
 def floor_text(comparison: Comparison) -> str:
     """Writes the floor of a comparison; that it limits nothing, where the errors are below it."""
-    in_unit = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
+    in_unit = display([e.point for e in (comparison.before, comparison.floor) if known(e)], "m")
     text = f"floor {estimate_text(comparison.floor, display_as=in_unit)}"
-    if known(comparison.floor) and comparison.floor.value > comparison.before.value:
+    if known(comparison.floor) and comparison.floor.point > comparison.before.point:
         return f"{text}, above the errors, so that it limits nothing"
     return text
 
 
-def parameter_text(estimate: Estimate) -> str:
+def parameter_text(estimate: Quantity) -> str:
     """Writes a calibrated parameter; that these recordings do not determine it, where its interval
     is wider than a factor of five to either side."""
     if not known(estimate) or estimate.unit not in _FACTORS:
         return with_level(estimate)
-    in_unit = display((estimate.value, estimate.low, estimate.high), estimate.unit)
+    in_unit = display((estimate.point, estimate.low, estimate.high), estimate.unit)
     if estimate.low > 0 and estimate.high > _DETERMINED**2 * estimate.low:
         return f"not determined by these recordings: {with_level(estimate)}"
-    if estimate.low == 0 and estimate.high > _DETERMINED * estimate.value:
+    if estimate.low == 0 and estimate.high > _DETERMINED * estimate.point:
         most = f"{number(in_unit.factor * estimate.high, digits=2)}{in_unit.suffix}"
         return (
             f"at most {most} {level_text(estimate.level)}, best "
-            f"{number(in_unit.factor * estimate.value, digits=2)}"
+            f"{number(in_unit.factor * estimate.point, digits=2)}"
         )
     return with_level(estimate)
 
@@ -383,7 +383,7 @@ def unseen_effects(verdict: Verdict) -> Iterator[tuple[str, str]]:
             yield label, "; ".join(f"{effect}: {why}" for effect, why in effects)
 
 
-def common_level(estimates: Iterable[Estimate]) -> str:
+def common_level(estimates: Iterable[Quantity]) -> str:
     """Writes the level of all intervals, or all that there are."""
     return ", ".join(
         level_text(level) for level in sorted({e.level for e in estimates if known(e)})

@@ -102,7 +102,7 @@ def _candidate_text(candidate: Candidate) -> str:
 
 
 def _comparison_line(comparison: Comparison, after_label: str) -> str:
-    in_unit = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
+    in_unit = display([e.point for e in (comparison.before, comparison.floor) if known(e)], "m")
     parts = [f"error {estimate_text(comparison.before, display_as=in_unit)}"]
     if known(comparison.after):
         parts[0] += f" → {estimate_text(comparison.after, display_as=in_unit)} {after_label}"

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
         with_level,
     )
     from measure.verdict.verdict_record import (
+        NAMES,
         Candidate,
         Comparison,
         Conclusion,
-        Estimate,
         NullTest,
         Parameter,
         Power,

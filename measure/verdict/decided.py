@@ -64,6 +64,6 @@ def times_floor(comparison: Comparison, verdict: Verdict) -> float:
     """Computes the error of that model in floors; 0 where either is not known."""
     after = bool(verdict.named) and known(comparison.after)
     error, floor = comparison.after if after else comparison.before, comparison.floor
-    if not known(error) or not known(floor) or not math.isfinite(floor.value) or floor.value <= 0:
+    if not known(error) or not known(floor) or not math.isfinite(floor.point) or floor.point <= 0:
         return 0.0
-    return error.value / floor.value
+    return error.point / floor.point

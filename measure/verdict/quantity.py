@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from measure.verdict.verdict_record import Estimate
+from flagdata.answer import Bound, Quantity
 
 MINUS = "\N{MINUS SIGN}"
 NONE = "\N{EM DASH}"
@@ -22,7 +22,6 @@ _MOST_DIGITS = 4  # of a number that comes with one
 _WIDEST = 1e5  # from here on, and below 1e-3, powers of ten
 _NARROWEST = 1e-3
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_BOUNDS = {"at-least": "at least", "at-most": "at most"}
 _THOUSANDTHS = {"m": "mm", "s": "ms"}
 
 
@@ -48,9 +47,9 @@ def display(values: Iterable[float], unit: str) -> Display:
     return Display(factor=1.0, unit=unit)
 
 
-def known(estimate: Estimate | None) -> bool:
+def known(estimate: Quantity | None) -> bool:
     """Returns whether there is anything to show."""
-    return estimate is not None and not math.isnan(estimate.value)
+    return estimate is not None and not math.isnan(estimate.point)
 
 
 def decimals(uncertainty: float) -> int:
@@ -79,22 +78,22 @@ def probability(value: float | None) -> str:
     return number(value, digits=2 if value >= 1e-3 else 1)
 
 
-def estimate_text(estimate: Estimate | None, *, display_as: Display | None = None) -> str:
+def estimate_text(estimate: Quantity | None, *, display_as: Display | None = None) -> str:
     """Formats `6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's
     caption or `with_level` states."""
     return " ".join(estimate_parts(estimate, display_as=display_as)).rstrip()
 
 
 def estimate_parts(
-    estimate: Estimate | None, *, display_as: Display | None = None
+    estimate: Quantity | None, *, display_as: Display | None = None
 ) -> tuple[str, str]:
     """Formats `6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
     if estimate is None or not known(estimate):
         return NONE, ""
     if estimate.bound is not None:
-        return _bound_words(estimate, estimate.bound, display_as), ""
-    inside = display_as or display((estimate.value, estimate.low, estimate.high), estimate.unit)
-    value, low, high = (inside.factor * v for v in (estimate.value, estimate.low, estimate.high))
+        return _bound_words(estimate, display_as), ""
+    inside = display_as or display((estimate.point, estimate.low, estimate.high), estimate.unit)
+    value, low, high = (inside.factor * v for v in (estimate.point, estimate.low, estimate.high))
     half = (high - low) / 2
     if math.isnan(half):
         return f"{number(value)}{inside.suffix}", ""
@@ -112,19 +111,19 @@ def estimate_parts(
     return f"{_round_fixed(value, rounded_to)}{power}{inside.suffix}", ends
 
 
-def _bound_words(estimate: Estimate, bound: str, display_as: Display | None) -> str:
+def _bound_words(estimate: Quantity, display_as: Display | None) -> str:
     """Formats `at least 900 N/m²`."""
-    if bound not in _BOUNDS:
+    if estimate.bound is Bound.NOTHING:
         return "not determined"
-    inside = display_as or display((estimate.value,), estimate.unit)
-    return f"{_BOUNDS[bound]} {number(inside.factor * estimate.value, digits=2)}{inside.suffix}"
+    inside = display_as or display((estimate.point,), estimate.unit)
+    return estimate.span.word(lambda end: number(inside.factor * end, digits=2), inside.suffix)
 
 
-def with_level(estimate: Estimate) -> str:
+def with_level(estimate: Quantity) -> str:
     """Formats `6.2 m/s [5.7, 6.8] 90 %`."""
     if not known(estimate):
         return NONE
-    if estimate.bound is not None and estimate.bound not in _BOUNDS:
+    if estimate.bound is Bound.NOTHING:
         return estimate_text(estimate)
     return f"{estimate_text(estimate)} {level_text(estimate.level)}"
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from flagdata.answer.quantity import Quantity
+
 
 class Conclusion(StrEnum):
     """What became of the base model."""
@@ -21,22 +23,9 @@ class Conclusion(StrEnum):
     OUTSIDE = "none of the library"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """A value with its interval: `value [low, high]` at `level`, in `unit`.
-
-    Attributes:
-        bound: "at-least" or "at-most" where it is known on one side only: `value` is then that
-            bound, and the other end is infinite or one that the quantity cannot pass; "nothing"
-            where all of the range looks alike.
-    """
-
-    value: float
-    low: float
-    high: float
-    unit: str
-    level: float = 0.9
-    bound: str | None = None
+NAMES = {Quantity: ("value=point", "low", "high", "unit", "level", "bound")}
+"""What documents of verdicts state of a quantity, since their first version; see
+`flagdata.core.json_values`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +59,7 @@ class Candidate:
 
     effect: str
     parameter: str
-    strength: Estimate
+    strength: Quantity
     z: float
     p_value: float
     p_family: float
@@ -78,7 +67,7 @@ class Candidate:
     gain_error: float
     behind: float
     leftover: float
-    by_recording: tuple[Estimate, ...] = ()
+    by_recording: tuple[Quantity, ...] = ()
     heterogeneity: float | None = None
     why_not: str = ""
     null: float = 0.0
@@ -105,14 +94,14 @@ class Comparison:
 
     what: str
     frames: int
-    before: Estimate
-    after: Estimate
-    reduction: Estimate
-    floor: Estimate
+    before: Quantity
+    after: Quantity
+    reduction: Quantity
+    floor: Quantity
     share: float | None
-    control: Estimate | None
+    control: Quantity | None
     control_name: str
-    apart: Estimate | None = None
+    apart: Quantity | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +179,7 @@ class NullTest:
 
     statistic: float
     null: list[float]
-    p_value: Estimate
+    p_value: Quantity
     kinds: int
     level: float
     critical: float | None
@@ -249,8 +238,8 @@ class Parameter:
     """
 
     name: str
-    before: Estimate
-    after: Estimate | None
+    before: Quantity
+    after: Quantity | None
     shift: float | None
     within: float | None = None
 
@@ -297,7 +286,7 @@ class Verdict:
     assumptions: tuple[str, ...] = ()
     separating: str = ""
     proposal: str = ""
-    apart: Estimate | None = None
+    apart: Quantity | None = None
     findings: tuple[tuple[str, str], ...] = ()
     unweighed: tuple[tuple[str, str], ...] = ()
     copied: tuple[tuple[str, str], ...] = ()

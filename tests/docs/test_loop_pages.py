@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.answer import Quantity
 from flagdata.core.schema import Kind
 from flagdata.ingest import write_folder
 from flagdata.lake import Lake, MeshSequence
@@ -25,7 +26,7 @@ from measure.nulls.bank import build
 from measure.propose import Decision, ProposalOutcome
 from measure.propose.proposal_log import entries
 from measure.trajectories import Experiment, load
-from measure.verdict import Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import Conclusion, Parameter, Verdict
 from sim.cloth.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
 from tests.measure.report.verdicts import Size, verdict
@@ -84,7 +85,8 @@ def concluded() -> Verdict:
     parameters = tuple(
         Parameter(name=name, before=one, after=one, shift=0.0)
         for name, one in (
-            (n, Estimate(value=v, low=0.9 * v, high=1.1 * v, unit="1")) for n, v in values.items()
+            (n, Quantity.of(value=v, low=0.9 * v, high=1.1 * v, unit="1"))
+            for n, v in values.items()
         )
     )
     return replace(

@@ -68,7 +68,7 @@ def test_arrays_become_an_experiment_and_a_verdict_its_answer(
     expected = verdict(Conclusion.EFFECT)
     assert (found.conclusion, found.named) == ("effect", expected.named)
     assert set(found.strengths) == set(expected.named)
-    assert found.p_value == expected.test.p_value.value
+    assert found.p_value == expected.test.p_value.point
     assert found.sentence in repr(found)
     assert found.save(tmp_path / "page.html").read_text(encoding="utf-8").startswith(found.page)
     assert found.named[0] in found._repr_html_()

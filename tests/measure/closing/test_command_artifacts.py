@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import sim.run.lake_models
+from flagdata.answer import Quantity
 from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
@@ -23,7 +24,7 @@ from measure.closing.model_recipes import models
 from measure.closing.verdict_artifacts import fingerprint, keep, read
 from measure.loop import LoopOptions
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
-from measure.verdict import Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import Conclusion, Parameter, Verdict
 from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh
 from sim.run import Crew, of_content
@@ -34,8 +35,8 @@ FITTED = {"area_weight": (1.0, 1.1), "bending": (1.6, 0.7), "damping": (0.004, 0
 """Before and after the effect was added; damping in seconds, the others of nominal."""
 
 
-def _about(value: float) -> Estimate:
-    return Estimate(value=value, low=0.9 * value, high=1.1 * value, unit="1")
+def _about(value: float) -> Quantity:
+    return Quantity.of(value=value, low=0.9 * value, high=1.1 * value, unit="1")
 
 
 def concluded(conclusion: Conclusion) -> Verdict:
@@ -240,7 +241,7 @@ def test_a_turned_wind_turns_before_a_run_begins(specimen: Specimen) -> None:
     whole = replace(found, named=("direction-change",), ranking=(turned, *found.ranking[1:]))
     larger = models(whole, experiment(specimen), name="x", seed=0)[1]
     assert larger.content["effects"]["direction-change"] == {
-        "angle": pytest.approx(found.ranking[0].strength.value),
+        "angle": pytest.approx(found.ranking[0].strength.point),
         "start": -1.0,
         "duration": 1e-3,
     }

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.answer import Quantity
 from flagdata.answer.closed import Closed
 from measure.closing import join_verdicts, joint_answer
 from measure.closing.answer_by_both import spoken
 from measure.closing.joint_verdict import Joint, _multiply_likelihoods
 from measure.report import answer_of_markers
 from measure.report.document import plain
-from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import CRITERIA, Conclusion, Parameter, Verdict
 from tests.golden_answers import changes
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import verdict
@@ -22,10 +23,10 @@ from tests.measure.report.verdicts import verdict
 NOMINAL = {"area_weight": 0.2, "bending": 1e-4}
 
 
-def interval(value: float, sigma: float, *, unit: str = "1") -> Estimate:
+def interval(value: float, sigma: float, *, unit: str = "1") -> Quantity:
     """90 %, of a logarithm known to ± sigma."""
     factor = math.exp(CRITERIA.reach * sigma)
-    return Estimate(value=value, low=value / factor, high=value * factor, unit=unit)
+    return Quantity.of(value=value, low=value / factor, high=value * factor, unit=unit)
 
 
 def judged(conclusion: Conclusion, p: float, *, named: tuple[str, ...] | None = None) -> Verdict:
@@ -125,12 +126,12 @@ def test_an_error_that_both_share_is_not_averaged_out() -> None:
 
 
 def test_an_upper_limit_is_not_combined_and_opposite_signs_are_apart() -> None:
-    limit = Estimate(value=0.0, low=0.0, high=3.0, unit="1")
+    limit = Quantity.of(value=0.0, low=0.0, high=3.0, unit="1")
     known = interval(1.0, 0.1)
     assert _multiply_likelihoods("x", limit, known).together == known
     assert _multiply_likelihoods("x", None, limit).together == limit
     assert _multiply_likelihoods("x", None, None).together is None
-    opposite = Estimate(value=-1.0, low=-1.2, high=-0.8, unit="1")
+    opposite = Quantity.of(value=-1.0, low=-1.2, high=-0.8, unit="1")
     found = _multiply_likelihoods("x", opposite, known)
     assert found.together is None
     assert found.apart == math.inf
@@ -160,10 +161,10 @@ def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_bot
     base, with_lift = found.cloth
     assert base.markers is not None
     assert with_lift.together is not None
-    assert base.markers.value == pytest.approx(0.22)
+    assert base.markers.point == pytest.approx(0.22)
     assert base.apart is not None
     assert base.apart > 5
-    assert with_lift.together.value == pytest.approx(0.2)
+    assert with_lift.together.point == pytest.approx(0.2)
     assert with_lift.together.unit == "kg/m²"
     answer = answer_of(found)
     assert "joint p = 0.020" in found.words

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 import pytest
 
-from flagdata.answer import Figure, Tone
+from flagdata.answer import Figure, Quantity, Tone
 from flagdata.errors import FlagdataError
 from measure.demo import Transcript, story
 from measure.demo.demo_cards import Card, Judgement, Truth, demonstration_answer
@@ -166,7 +166,9 @@ def aligned(
     def step() -> Card:
         shell = Transcript(folder=tmp_path)
         (shell.folder / "alignment.png").write_bytes(b"png")
-        clock = Recovered(offset=-12.3, low=-13.1, high=-11.5, confidence=1.0, truth=-12.0)
+        clock = Recovered(
+            offset=Quantity.of(-12.3, -13.1, -11.5, unit="s"), confidence=1.0, truth=-12.0
+        )
         monkeypatch.setattr(story, "compare_clock", lambda *_: clock)
         lake = SimpleNamespace(rows=lambda *_, **__: SimpleNamespace(to_pylist=lambda: [{}]))
         monkeypatch.setattr(story.Lake, "open", lambda _: lake)

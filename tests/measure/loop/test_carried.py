@@ -131,8 +131,8 @@ def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank:
         # Each kind counts for the share of its groups that are as far, and the data for one more
         # kind.
         as_far = np.array(test.null) >= test.statistic
-        assert 1 / (KINDS + 1) <= test.p_value.value <= (1 + as_far.sum()) / (KINDS + 1)
-        assert (test.p_value.value > LEVEL) == (verdict in accepted)
+        assert 1 / (KINDS + 1) <= test.p_value.point <= (1 + as_far.sum()) / (KINDS + 1)
+        assert (test.p_value.point > LEVEL) == (verdict in accepted)
         assert "carried along the recordings' own ways" in test.nulls
         assert any("carried where the markers at them go" in words for words in verdict.assumptions)
 

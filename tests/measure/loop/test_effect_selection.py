@@ -54,7 +54,7 @@ def test_a_pressure_that_fluctuates_is_called_gusts(
     # Half a relative deviation of the pressure is a quarter of the speed's; of twelve segments,
     # known to a fifth.
     strengths = [
-        one.ranking[0].candidate.strength.value for one in found if named(one) == ["gusts"]
+        one.ranking[0].candidate.strength.point for one in found if named(one) == ["gusts"]
     ]
     assert strengths == pytest.approx([0.25] * len(strengths), rel=0.6)
 

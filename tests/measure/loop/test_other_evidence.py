@@ -123,7 +123,7 @@ def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(
     found = next(w for w in within.ranking if w.column == GUST_COLUMN).candidate
     # Weaker by 2 in three windows of nine, and in both of two neighbours in two of nine: a
     # covariance of 4 (2/9 − 1/9).
-    assert found.strength.value == pytest.approx(2 / 3, rel=0.1)
+    assert found.strength.point == pytest.approx(2 / 3, rel=0.1)
     assert not found.why_not
 
 

@@ -42,10 +42,10 @@ def test_scatter_and_spread_among_codes_add_in_quadrature() -> None:
     assert CRITERIA.area_weight_between == 0.07
     assert CRITERIA.bending_between == 0.6
     area_weight, bending = found["area_weight"], found["bending"]
-    assert math.log(area_weight.before.high / area_weight.before.value) == pytest.approx(
+    assert math.log(area_weight.before.high / area_weight.before.point) == pytest.approx(
         REACH * math.sqrt(0.0058), rel=1e-6
     )
-    assert math.log(area_weight.before.value / area_weight.before.low) == pytest.approx(
+    assert math.log(area_weight.before.point / area_weight.before.low) == pytest.approx(
         REACH * math.sqrt(0.0058), rel=1e-6
     )
     assert math.log(bending.before.high / bending.before.low) == pytest.approx(2 * REACH, rel=1e-6)
@@ -61,9 +61,9 @@ def test_codes_do_not_make_the_interval_wider_than_the_scale_did() -> None:
         {"area_weight": 0.015, "bending": 0.8, "damping": 0.1},
     )
     area_weight = estimated(fitted, errors, weighed=0.02)["area_weight"].before
-    assert math.log(area_weight.high / area_weight.value) == pytest.approx(REACH * 0.02, rel=1e-6)
+    assert math.log(area_weight.high / area_weight.point) == pytest.approx(REACH * 0.02, rel=1e-6)
     area_weight = estimated(fitted, errors, weighed=0.5)["area_weight"].before
-    assert math.log(area_weight.high / area_weight.value) == pytest.approx(
+    assert math.log(area_weight.high / area_weight.point) == pytest.approx(
         REACH * math.hypot(0.015, 0.07), rel=1e-6
     )
 
@@ -95,6 +95,6 @@ def test_of_much_damping_what_codes_differ_by_hardly_shows() -> None:
     factor = math.exp(REACH * math.hypot(0.2, 1.1))
     assert damping.low == pytest.approx(30e-3 / factor, rel=0.1)
     assert damping.high == pytest.approx(30e-3 * factor, rel=1e-3)
-    assert damping.value - damping.low == pytest.approx(
+    assert damping.point - damping.low == pytest.approx(
         math.hypot(30e-3 * (1 - 1 / factor), REACH * 2.4e-3), rel=1e-6
     )

@@ -160,14 +160,14 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
     assert dragged.named[:1] == ("tangential-linear-drag",)
     slow, fast, late = dragged.comparisons
     for comparison in (fast, late):
-        assert comparison.after.value < comparison.before.value
+        assert comparison.after.point < comparison.before.point
     # At 3.5 m/s the base model errs by about as much as the numerical floor, so that there is
     # nothing to gain.
     assert slow.reduction.high > 0
     for left_out in (slow, fast):
         assert left_out.control_name == "tangential-quadratic-drag"
         assert left_out.apart is not None
-        assert left_out.apart.value > 0
+        assert left_out.apart.point > 0
     # At 3.5 m/s alone, by four segments, both drags may be within the floor's reach; both
     # recordings together separate them by six standard errors, and so does the fast one by itself,
     # in metres too.
@@ -191,7 +191,7 @@ def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(
     (found,) = [c for c in verdict.ranking if c.effect == "full-hoist"]
     assert (found.strength.bound, found.strength.level) == ("at-least", 0.95)
     assert 0 < found.strength.low < true < found.strength.high
-    assert found.strength.value == found.strength.low
+    assert found.strength.point == found.strength.low
     assert (
         from_document(json.loads(json.dumps(as_document(verdict), allow_nan=False))).ranking
         == verdict.ranking
@@ -208,7 +208,7 @@ def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_o
     """By nine kinds of numerics of which none is as far, up to 28 % of all may be: 0.05^(1/9) =
     0.72."""
     test = dragged.test
-    assert test.p_value.value == pytest.approx(1 / 10)
+    assert test.p_value.point == pytest.approx(1 / 10)
     assert test.p_value.high == pytest.approx(1 - 0.05 ** (1 / 9))
     assert test.open
     assert test.settling == 29  # 0.9^28 > 5 % > 0.9^29
@@ -280,7 +280,7 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
     """Nine kinds of numerics: no p is below 1/10."""
     verdict = close_loop(pulled, LoopOptions(bank=bank))
     assert verdict.conclusion is Conclusion.UNTESTED
-    assert verdict.test.p_value.value >= 1 / 10
+    assert verdict.test.p_value.point >= 1 / 10
     assert "cannot be tested at level 0.05" in verdict.words
     assert "at least 19 are needed" in verdict.words  # K + 1 ≥ 1/0.05
     assert not verdict.test.open

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 import torch
 
+from flagdata.answer import Quantity
 from flagdata.errors import NotFoundError, UsageError
 from measure.propose import Decision, ProposalOutcome, Term, write
 from measure.propose.candidates import from_file
 from measure.propose.outcome import StrengthCourse, TermStrength
 from measure.propose.terms import TermEffect
-from measure.verdict import Estimate
 from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.effects import apply, load
@@ -42,7 +42,7 @@ def proposal(**fitted: tuple[float, str]) -> ProposalOutcome:
             name=name,
             words="a push",
             course=course,
-            estimate=Estimate(value=value, low=value - 0.1, high=value + 0.1, unit=unit),
+            estimate=Quantity.of(value=value, low=value - 0.1, high=value + 0.1, unit=unit),
         )
         for name, (value, unit) in fitted.items()
     )

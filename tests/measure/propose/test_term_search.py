@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from flagdata.answer import Quantity
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import Column, EffectColumn
 from measure.nulls import NullBank, NullOptions
@@ -17,7 +18,6 @@ from measure.propose.outcome import Retest
 from measure.propose.proposal_words import words
 from measure.propose.term_search import weigh
 from measure.trajectories import Experiment, Specimen, WindTrack
-from measure.verdict import Estimate
 from sim.cloth.scene import assemble, flag
 from sim.effects import FieldEffect, Seen, load
 from tests.measure.propose.conftest import PUSH
@@ -44,9 +44,9 @@ def test_a_planted_push_is_kept(found: ProposalOutcome) -> None:
     # Beside terms of another direction, and above what the numerics leave.
     assert found.retest.control is not None
     assert found.retest.apart is not None
-    assert found.retest.apart.value > 0
+    assert found.retest.apart.point > 0
     # What is left with the right term is about what numerics alone leave.
-    assert 0.5 < found.retest.floor.value / found.retest.after.value < 2.0
+    assert 0.5 < found.retest.floor.point / found.retest.after.point < 2.0
     assert any(strength.name.startswith("leftward") for strength in found.strengths)
     assert "kept" in words(found)
 
@@ -55,7 +55,7 @@ def test_the_effect_of_the_file_is_the_planted_field(
     found: ProposalOutcome, specimen: Specimen, tmp_path: Path
 ) -> None:
     made = load(write(found, tmp_path).spec)
-    effect = made(**{strength.name: strength.estimate.value for strength in found.strengths})
+    effect = made(**{strength.name: strength.estimate.point for strength in found.strengths})
     assert isinstance(effect, FieldEffect)
     system, state = assemble(
         [flag(material=specimen.material, wind_speed=4.5, columns=6)], dtype=torch.float64
@@ -80,7 +80,7 @@ def test_a_steady_force_is_seen_to_be_steady(found: ProposalOutcome) -> None:
     strength = next(s for s in found.strengths if s.name.startswith("leftward"))
     course = strength.course
     assert len(course.by_recording) == 4
-    means = [mean.value for mean in course.by_recording]
+    means = [mean.point for mean in course.by_recording]
     # A force that grew with the wind's square would differ by (6/3.5)² = 2.9 between the
     # recordings; a steady one, by what the numerics leave in each: less than the square root of
     # that.
@@ -97,8 +97,10 @@ def test_a_recording_in_calm_air_is_refused(pushed: Experiment) -> None:
 def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decision, str]:
     """The decision for a gain with a lower end, and a control with a difference and its lower end
     [nat]."""
-    some = Estimate(value=0.01, low=0.009, high=0.011, unit="m")
-    control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="1")
+    some = Quantity.of(value=0.01, low=0.009, high=0.011, unit="m")
+    control = (
+        None if apart is None else Quantity.of(value=apart[0], low=apart[1], high=0.01, unit="1")
+    )
     return Retest(
         what="",
         segments=6,

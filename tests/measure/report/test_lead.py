@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+from flagdata.answer import Bound, Quantity
 from measure.report import lead
 from measure.report.lead_sentences import evidence, explained_words, p_text, spoken
-from measure.verdict import Conclusion, Estimate, with_level
+from measure.verdict import Conclusion, with_level
 from tests.measure.report.pages import page_of_words, parsed
-from tests.measure.report.verdicts import about, verdict
+from tests.measure.report.verdicts import about, changed, verdict
 
 
 @pytest.mark.parametrize(
@@ -36,7 +37,7 @@ def test_an_effect_is_named_with_its_size_its_share_of_the_error_and_one_p() -> 
         whole, test=replace(whole.test, level=0.05, p_value=about(0.024, 0.0, unit="1"))
     )
     whole = replace(
-        whole, test=replace(whole.test, p_value=replace(whole.test.p_value, low=0.0, high=0.07))
+        whole, test=replace(whole.test, p_value=changed(whole.test.p_value, low=0.0, high=0.07))
     )
     said = lead(whole)
     strength = next(c.strength for c in whole.ranking if c.effect == "lift")
@@ -108,7 +109,7 @@ def test_without_a_share_the_error_itself_is_compared() -> None:
 def test_an_upper_end_that_is_the_value_is_not_repeated() -> None:
     test = verdict(Conclusion.EFFECT).test
     assert (
-        p_text(replace(test, p_value=replace(test.p_value, value=0.024, high=0.024))) == "p = 0.024"
+        p_text(replace(test, p_value=changed(test.p_value, value=0.024, high=0.024))) == "p = 0.024"
     )
 
 
@@ -136,15 +137,15 @@ def test_the_chart_is_in_per_cent_of_the_base_models_error() -> None:
         for e in parsed(page_of_words(whole)).all("svg")
         if "per cent" in e.attributes.get("aria-label", "")
     )
-    share = 100 * first.after.value / first.before.value
+    share = 100 * first.after.point / first.before.point
     assert f"{first.what}: {share:.0f} % with lift" in svg.attributes["aria-label"]
 
 
 def test_a_verdict_can_be_said_aloud() -> None:
     """In fewer than 25 words, with a bound in words, whatever is concluded of whatever effects."""
     whole = verdict(Conclusion.EFFECT)
-    bound = Estimate(
-        value=0.35, low=0.35, high=math.inf, unit="kg/m²", level=0.95, bound="at-least"
+    bound = Quantity.of(
+        value=0.35, low=0.35, high=math.inf, unit="kg/m²", level=0.95, bound=Bound.LEAST
     )
     rain = replace(whole.ranking[0], effect="wet-mass", parameter="uptake", strength=bound)
     named = replace(whole, named=("wet-mass",), ranking=(rain,))

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from measure.verdict import Conclusion, Estimate, Verdict
+from flagdata.answer import Quantity
+from measure.verdict import Conclusion, Verdict
 from tests.measure.report.pages import page, parsed
 from tests.measure.report.verdicts import Size, residual, verdict, with_holes
 
@@ -35,9 +36,9 @@ def numbers(value: Any) -> Iterator[float]:
             yield from numbers(item)
 
 
-def estimates(value: Any) -> Iterator[Estimate]:
+def estimates(value: Any) -> Iterator[Quantity]:
     """Every interval a verdict holds."""
-    if isinstance(value, Estimate):
+    if isinstance(value, Quantity):
         yield value
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         for field in dataclasses.fields(value):
@@ -247,7 +248,7 @@ def test_a_verdict_with_nothing_but_a_test_still_makes_a_page() -> None:
             null=[],
             statistic=math.nan,
             critical=None,
-            p_value=Estimate(value=math.nan, low=math.nan, high=math.nan, unit="1"),
+            p_value=Quantity.of(value=math.nan, low=math.nan, high=math.nan, unit="1"),
         ),
     )
     assert parsed(page(bare)).faults == []

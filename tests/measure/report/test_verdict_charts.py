@@ -15,7 +15,7 @@ from measure.report.recordings_chart import recording_chart
 from measure.report.verdict_charts import errors_chart, gains_chart, null_chart
 from measure.trajectories import Trajectory, WindTrack
 from measure.verdict import Conclusion
-from tests.measure.report.verdicts import verdict
+from tests.measure.report.verdicts import changed, verdict
 
 
 def marks(chart: object, kind: type[Mark]) -> list:
@@ -35,15 +35,15 @@ def test_bars_of_errors_are_in_per_cent_of_the_base_models_and_the_floor_is_behi
     floor, before, after = marks(chart, Bars)
     first = comparisons[0]
     assert before.lengths == pytest.approx([100.0] * len(comparisons))
-    assert after.lengths[0] == pytest.approx(100 * first.after.value / first.before.value)
-    assert after.low[0] == pytest.approx(100 * first.after.low / first.before.value)
-    assert floor.lengths[0] == pytest.approx(100 * first.floor.value / first.before.value)
+    assert after.lengths[0] == pytest.approx(100 * first.after.point / first.before.point)
+    assert after.low[0] == pytest.approx(100 * first.after.low / first.before.point)
+    assert floor.lengths[0] == pytest.approx(100 * first.floor.point / first.before.point)
     assert errors_chart(verdict(Conclusion.SUFFICIENT).comparisons, after="") is None
 
 
 def test_an_interval_longer_than_its_bar_has_room_and_a_figure_behind_it() -> None:
     first = verdict(Conclusion.EFFECT).comparisons[0]
-    wide = replace(first, before=replace(first.before, high=2 * first.before.value))
+    wide = replace(first, before=changed(first.before, high=2 * first.before.point))
     chart = errors_chart([wide], after="with lift")
     assert chart is not None
     assert chart.rows[0][0].x.limits == (0, pytest.approx(240))
@@ -52,7 +52,7 @@ def test_an_interval_longer_than_its_bar_has_room_and_a_figure_behind_it() -> No
 
 def test_a_bar_far_beyond_is_cut_and_its_figure_is_not() -> None:
     first = verdict(Conclusion.EFFECT).comparisons[0]
-    worse = replace(first, after=replace(first.after, value=9 * first.before.value, high=math.inf))
+    worse = replace(first, after=changed(first.after, value=9 * first.before.point, high=math.inf))
     after = marks(errors_chart([worse], after="with lift"), Bars)[2]
     assert (after.lengths, after.texts) == ([250.0], ["900 %"])
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from flagdata.answer import Quantity
 from measure.report import lead, verdict_sentences
 from measure.report.verdict_sentences import titles
 from measure.report.verdict_words import words
-from measure.verdict import Conclusion, Estimate, NullTest
+from measure.verdict import Conclusion, NullTest
 from tests.measure.report.pages import page_of_words
 from tests.measure.report.verdicts import about, verdict
 
@@ -192,7 +193,7 @@ def test_a_reduction_whose_interval_contains_zero_is_pointed_out() -> None:
 
 def test_missing_numbers_raise_no_warning() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
-    assert all(math.isnan(c.after.value) for c in whole.comparisons)
+    assert all(math.isnan(c.after.point) for c in whole.comparisons)
     assert (
         verdict_sentences.control_warnings(whole) + verdict_sentences.reduction_warnings(whole)
         == []
@@ -219,13 +220,13 @@ def test_names_are_listed_as_people_do(names: list[str], text: str) -> None:
 def test_what_recordings_do_not_determine_is_not_shown_like_what_they_do(
     low: float, value: float, high: float, unit: str, said: str
 ) -> None:
-    shown = Estimate(value=value, low=low, high=high, unit=unit)
+    shown = Quantity.of(value=value, low=low, high=high, unit=unit)
     assert verdict_sentences.parameter_text(shown).startswith(said)
 
 
 def test_a_floor_above_the_errors_limits_nothing_and_takes_no_significant_reduction_back() -> None:
     first = verdict(Conclusion.EFFECT).comparisons[0]
-    high = replace(first, floor=about(2 * first.before.value, 1e-5), share=None)
+    high = replace(first, floor=about(2 * first.before.point, 1e-5), share=None)
     whole = replace(verdict(Conclusion.EFFECT), comparisons=(high,))
     assert "above the errors, so that it limits nothing" in verdict_sentences.floor_text(high)
     assert "limits nothing" not in verdict_sentences.floor_text(first)

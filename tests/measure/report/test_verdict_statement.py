@@ -15,7 +15,7 @@ from measure.report.verdict_statement import assumptions, blowing, bounds, propo
 from measure.trajectories import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion
 from sim.effects import EFFECTS
-from tests.measure.report.verdicts import verdict
+from tests.measure.report.verdicts import changed, verdict
 
 
 def test_the_most_certain_modes_are_reported_first() -> None:
@@ -85,7 +85,7 @@ def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
 
 def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_settle_it() -> None:
     test = replace(verdict(Conclusion.EFFECT).test, level=0.05, open=True, settling=59)
-    test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
+    test = replace(test, p_value=changed(test.p_value, value=0.024, low=0.0, high=0.072))
     (remark,) = by_draw(test)
     assert (
         remark

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flagdata.answer import Quantity
 from measure.verdict import (
     Candidate,
     Comparison,
     Conclusion,
-    Estimate,
     NullTest,
     Parameter,
     Residual,
@@ -30,8 +30,14 @@ EFFECTS = (
 )
 
 
-def about(value: float, half: float, unit: str = "m") -> Estimate:
-    return Estimate(value=value, low=value - half, high=value + half, unit=unit)
+def changed(one: Quantity, **ends: float) -> Quantity:
+    """The same with another value or another end."""
+    given = {"value": one.point, "low": one.low, "high": one.high, **ends}
+    return Quantity.of(**given, unit=one.unit, level=one.level, bound=one.bound)
+
+
+def about(value: float, half: float, unit: str = "m") -> Quantity:
+    return Quantity.of(value=value, low=value - half, high=value + half, unit=unit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +127,7 @@ def candidates(named: tuple[str, ...], recordings: int) -> tuple[Candidate, ...]
 
 
 def comparison(what: str, before: float, *, with_after: bool) -> Comparison:
-    missing = Estimate(value=math.nan, low=math.nan, high=math.nan, unit="m")
+    missing = Quantity.of(value=math.nan, low=math.nan, high=math.nan, unit="m")
     after = 0.4 * before
     return Comparison(
         what=what,
@@ -184,7 +190,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         test=NullTest(
             statistic=statistic,
             null=null.tolist(),
-            p_value=Estimate(value=p, low=0.5 * p, high=min(2.5 * p, 1.0), unit="1"),
+            p_value=Quantity.of(value=p, low=0.5 * p, high=min(2.5 * p, 1.0), unit="1"),
             kinds=20 if untested else 199,
             level=0.01,
             critical=None if untested else float(np.sort(null)[-2]),
@@ -272,7 +278,7 @@ def with_holes(whole: Verdict) -> Verdict:
     best, *rest = whole.ranking
     unweighed = replace(
         rest[-1],
-        strength=Estimate(value=nan, low=nan, high=nan, unit="N"),
+        strength=Quantity.of(value=nan, low=nan, high=nan, unit="N"),
         z=nan,
         p_value=nan,
         p_family=nan,
@@ -282,5 +288,5 @@ def with_holes(whole: Verdict) -> Verdict:
         leftover=nan,
         by_recording=(),
     )
-    open_ended = replace(best, strength=replace(best.strength, high=math.inf))
+    open_ended = replace(best, strength=changed(best.strength, high=math.inf))
     return replace(whole, residuals=(lost, *others), ranking=(open_ended, *rest[:-1], unweighed))

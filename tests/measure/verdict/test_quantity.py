@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from flagdata.answer import Quantity
 from measure.verdict import (
-    Estimate,
     display,
     estimate_text,
     in_errors,
@@ -21,8 +21,8 @@ from measure.verdict import (
 
 def estimate(
     value: float, low: float, high: float, unit: str = "1", level: float = 0.9
-) -> Estimate:
-    return Estimate(value=value, low=low, high=high, unit=unit, level=level)
+) -> Quantity:
+    return Quantity.of(value=value, low=low, high=high, unit=unit, level=level)
 
 
 @pytest.mark.parametrize(("error", "text"), [(0.119, "0.83 ± 0.12"), (0.367, "0.8 ± 0.4")])
@@ -59,7 +59,7 @@ def test_the_house_example_of_a_wind_with_its_interval() -> None:
         (None, "—"),
     ],
 )
-def test_intervals_worked_by_hand(given: Estimate | None, text: str) -> None:
+def test_intervals_worked_by_hand(given: Quantity | None, text: str) -> None:
     assert estimate_text(given) == text
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from measure.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from flagdata.answer import Quantity
+from measure.verdict import Candidate, Comparison, Conclusion, NullTest, Verdict
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.filing import Filing, verdict_json
 from tests.studies.challenge.recipe import Kind
@@ -81,8 +82,8 @@ def key(
     )
 
 
-def estimate(value: float, half: float = 0.1) -> Estimate:
-    return Estimate(value=value, low=value - half, high=value + half, unit="1")
+def estimate(value: float, half: float = 0.1) -> Quantity:
+    return Quantity.of(value=value, low=value - half, high=value + half, unit="1")
 
 
 def candidate(effect: str, *, strength: float = 1.0, half: float = 0.1) -> Candidate:

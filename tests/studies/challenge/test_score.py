@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound, Quantity
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from measure.verdict import Candidate, Conclusion, Estimate, Verdict
+from measure.verdict import Candidate, Conclusion, Verdict
 from sim.effects import EFFECTS
 from tests.studies.challenge import sheet as sheets
 from tests.studies.challenge.answer_key import AnswerKey
@@ -303,7 +304,9 @@ def test_a_strength_that_is_a_bound_contains_the_truth_on_its_side_and_has_no_er
         bound = next(bounds)
         return replace(
             candidate("lift"),
-            strength=Estimate(value=bound, low=bound, high=math.inf, unit="1", bound="at-least"),
+            strength=Quantity.of(
+                value=bound, low=bound, high=math.inf, unit="1", bound=Bound.LEAST
+            ),
         )
 
     result = sheet(

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.answer import Quantity
 from flagdata.core.json_values import json_values
 from measure.closing import close_loop
 from measure.forecasting import Setting
@@ -43,7 +44,7 @@ from measure.trajectories import (
     from_arrays,
     observe,
 )
-from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict
+from measure.verdict import CRITERIA, Conclusion, Verdict
 from tests.evidence import ABSENT
 from tests.studies.validation.arcsim import RATE, folder
 from tests.studies.validation.flags_runs import CAMEL
@@ -166,7 +167,7 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
         "said": verdict.conclusion.value,
         "named": list(verdict.named),
         "right": _right(verdict, truth),
-        "p": verdict.test.p_value.value,
+        "p": verdict.test.p_value.point,
         "p low": verdict.test.p_value.low,
         "p high": verdict.test.p_value.high,
         "statistic": verdict.test.statistic,
@@ -177,7 +178,7 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
             {
                 "effect": c.effect,
                 "low": c.strength.low,
-                "value": c.strength.value,
+                "value": c.strength.point,
                 "high": c.strength.high if math.isfinite(c.strength.high) else None,
                 "gain": c.gain,
                 "behind": c.behind,
@@ -190,9 +191,9 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
         "unseen": [
             {
                 "what": c.what,
-                "before": c.before.value,
-                "after": c.after.value,
-                "floor": c.floor.value,
+                "before": c.before.point,
+                "after": c.after.point,
+                "floor": c.floor.point,
             }
             for c in verdict.comparisons
         ],
@@ -213,7 +214,7 @@ def _right(verdict: Verdict, truth: Truth) -> bool:
     )
 
 
-def _interval(found: Estimate, true: float | None) -> dict[str, Any]:
+def _interval(found: Quantity, true: float | None) -> dict[str, Any]:
     covers = None if true is None else found.low <= true <= found.high
     return {"low": found.low, "value": found.value, "high": found.high, "covers": covers}
 

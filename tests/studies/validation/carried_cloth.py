@@ -188,14 +188,14 @@ def _row(verdict: Verdict) -> dict[str, Any]:
         "conclusion": verdict.conclusion.value,
         "named": list(verdict.named),
         "words": verdict.words,
-        "p": verdict.test.p_value.value,
+        "p": verdict.test.p_value.point,
         "statistic": verdict.test.statistic,
         "largest_null": max(verdict.test.null),
         "kinds": verdict.test.kinds,
         "nulls": verdict.test.nulls,
         "error": float(np.sqrt(squares.mean())),
-        "parameters": {p.name: p.before.value for p in verdict.parameters},
-        "ranking": [[c.effect, c.strength.value, c.why_not] for c in verdict.ranking[:5]],
+        "parameters": {p.name: p.before.point for p in verdict.parameters},
+        "ranking": [[c.effect, c.strength.point, c.why_not] for c in verdict.ranking[:5]],
     }
 
 

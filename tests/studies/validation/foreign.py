@@ -25,6 +25,7 @@ from typing import Any
 
 import torch
 
+from flagdata.answer import Quantity
 from flagdata.core.rng import child_seed
 from flagdata.errors import InputError, NotFoundError
 from measure.closing import close_loop
@@ -32,7 +33,7 @@ from measure.forecasting import Segments
 from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.trajectories import Observed, load, read
-from measure.verdict import NOT_REJECTED, Conclusion, Estimate
+from measure.verdict import NOT_REJECTED, Conclusion
 from tests.studies.challenge.classes import class_of
 from tests.studies.shares import Share
 from tests.studies.validation.environments import MUJOCO
@@ -158,7 +159,7 @@ def _graded(truth: Truth, observed: Observed, bank: Path | None, seed: int) -> d
         "named": list(verdict.named),
         "words": verdict.words,
         "statistic": verdict.test.statistic,
-        "p": verdict.test.p_value.value,
+        "p": verdict.test.p_value.point,
         "p_interval": [verdict.test.p_value.low, verdict.test.p_value.high],
         "level": verdict.test.level,
         "parameters": {name: _interval(of[name], true[name]) for name in _COVERED},
@@ -196,7 +197,7 @@ def grade(truth: Truth, said: Conclusion, named: Sequence[str]) -> str:
     return "class" if class_of(effect) in {class_of(name) for name in named} else "wrong"
 
 
-def _interval(found: Estimate, true: float) -> dict[str, Any]:
+def _interval(found: Quantity, true: float) -> dict[str, Any]:
     return {
         "true": true,
         "value": found.value,

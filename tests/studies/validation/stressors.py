@@ -32,6 +32,7 @@ import numpy as np
 import torch
 from scipy.signal import lfilter
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray
 from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
@@ -52,7 +53,7 @@ from measure.trajectories import (
     observe,
     sheet,
 )
-from measure.verdict import CRITERIA, Estimate
+from measure.verdict import CRITERIA
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.wind import VonKarman
@@ -245,9 +246,9 @@ def _judged(truth: Truth, stressor: str, number: int, seed: int, bank: Path) -> 
         **row,
         "said": verdict.conclusion.value,
         "named": list(verdict.named),
-        "p": test.p_value.value,
+        "p": test.p_value.point,
         "statistic": test.statistic,
-        "rejected": test.p_value.value <= test.level,
+        "rejected": test.p_value.point <= test.level,
         "lags": list(found.lags),
         "seconds": verdict.seconds,
         "covered": {
@@ -258,7 +259,7 @@ def _judged(truth: Truth, stressor: str, number: int, seed: int, bank: Path) -> 
     }
 
 
-def _holds(estimate: Estimate, true: float) -> bool:
+def _holds(estimate: Quantity, true: float) -> bool:
     return bool(estimate.low <= true <= estimate.high)
 
 

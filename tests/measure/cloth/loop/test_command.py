@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from flagdata.answer import Quantity
 from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
@@ -20,7 +21,7 @@ from measure.forecasting.regressors import weighed_columns
 from measure.loop import LoopOptions
 from measure.observables import WINDOW
 from measure.trajectories import Experiment
-from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import CRITERIA, Conclusion, Parameter, Verdict
 from sim.effects import Need
 from sim.run import load
 from tests.golden_answers import changes
@@ -195,7 +196,7 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
 
     def closed(experiment: Experiment, options: LoopOptions, *, stage: object) -> Verdict:
         levels.append(options.level)
-        one = Estimate(value=1.0, low=0.8, high=1.2, unit="of nominal")
+        one = Quantity.of(value=1.0, low=0.8, high=1.2, unit="of nominal")
         fitted = [
             Parameter(name=name, before=one, after=one, shift=0.0)
             for name in ("area_weight", "bending", "damping")

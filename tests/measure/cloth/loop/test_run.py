@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
+from flagdata.answer import Quantity
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.errors import RefusedError, UsageError
 from measure.cloth import FlagBatch, Observed, close_loop, simulations, solve, verdict_of, weighable
 from measure.cloth.films_verdict import strength_of
 from measure.cloth.model_evidence import Fit
-from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict, with_level
+from measure.verdict import CRITERIA, Conclusion, Verdict, with_level
 from tests.measure.cloth.loop.conftest import ALIKE, EFFECTS, options, recording, simulate_cheaply
 
 DRAG = {"tangential-linear-drag.coefficient": 0.9}
@@ -73,7 +74,7 @@ def test_an_effect_is_named_with_its_strength(dragged: Verdict) -> None:
     assert dragged.conclusion is Conclusion.EFFECT
     assert dragged.named == ("tangential-linear-drag",)
     assert dragged.test.effective is not None
-    assert dragged.test.p_value.value == pytest.approx(1 / (1 + dragged.test.effective))
+    assert dragged.test.p_value.point == pytest.approx(1 / (1 + dragged.test.effective))
     strength = dragged.ranking[0].strength
     assert strength.low < 0.9 < strength.high
     assert strength.value == pytest.approx(0.9, rel=0.15)
@@ -89,11 +90,11 @@ def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_un
     assert set(moved) == {"amplitude-across, other halves", "amplitude-across, recordings left out"}
     for one in moved.values():
         assert one.before.unit == "1"
-        assert one.before.value > 0.08  # of 0.12 that the effect makes
-        assert one.after.value < 0.03
+        assert one.before.point > 0.08  # of 0.12 that the effect makes
+        assert one.after.point < 0.03
         assert one.reduction.low > 0
         assert one.control is not None
-        assert one.control.value > 0.08
+        assert one.control.point > 0.08
 
 
 def test_a_recording_that_shows_nothing_in_one_half_is_judged_as_a_whole(
@@ -173,13 +174,13 @@ def test_an_effect_that_is_not_weighed_is_refused() -> None:
 def test_a_cloth_that_is_heavier_than_it_was_weighed_is_not_the_base_model(
     cheap: list[int], plain: Verdict, tmp_path: Path
 ) -> None:
-    recordings, own = both(), plain.parameters[0].before.value
+    recordings, own = both(), plain.parameters[0].before.point
     right = close_loop(recordings, options(area_weight=f"{own}±{0.02 * own}"), folder=tmp_path)
     wrong = close_loop(
         recordings, options(area_weight=f"{0.5 * own}±{0.01 * own}"), folder=tmp_path
     )
     assert right.conclusion is Conclusion.SUFFICIENT
-    assert wrong.test.p_value.value <= 0.05
+    assert wrong.test.p_value.point <= 0.05
 
 
 def test_what_is_missing_is_stated_with_its_size_and_unit(dragged: Verdict) -> None:
@@ -225,7 +226,7 @@ def test_a_strength_beyond_what_is_assumed_is_a_bound(cheap: list[int], tmp_path
     strength = found.ranking[0].strength
     assert found.named == ("tangential-linear-drag",)
     assert strength.bound == "at-least"
-    assert 0.5 < strength.value == strength.low < 1.5
+    assert 0.5 < strength.point == strength.low < 1.5
     assert strength.high == math.inf
     assert strength.level == pytest.approx(0.95)
     assert "at least" in found.words
@@ -237,7 +238,7 @@ def test_a_strength_of_two_signs_leans_on_either_end() -> None:
     )  # −0.3 to 0.8
     null, factor = shear.column.described.null, np.exp(CRITERIA.reach * CRITERIA.strength_factor)
 
-    def at(*shares: float) -> Estimate:
+    def at(*shares: float) -> Quantity:
         scores = ndtri(np.array(shares))[None, :, None]
         none, even = np.zeros(1), np.full((1, len(shares)), 1 / len(shares))
         return strength_of(shear, Fit(evidence=none, misfit=none, scores=scores, weights=even))

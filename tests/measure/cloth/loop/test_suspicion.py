@@ -80,7 +80,7 @@ def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_be
         assert "stated beforehand" in answer_of_films(found[text], outcome).page
         assert found[text].provenance["options"]["suspected"] == f"{text}+"
     assert found["lift"].named == ("lift",)
-    assert found["lift"].test.p_value.value <= 0.05
+    assert found["lift"].test.p_value.point <= 0.05
     assert found["tangential-linear-drag"].conclusion in (
         Conclusion.SUFFICIENT,
         Conclusion.UNDECIDED,
