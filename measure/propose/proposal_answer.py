@@ -12,7 +12,7 @@ from flagdata.core.json_values import json_values
 from measure.propose.outcome import Decision, ProposalOutcome, Retest, TermStrength
 from measure.propose.proposal_words import words
 from measure.verdict.quantity import estimate_text, number, probability
-from measure.verdict.verdict_record import NAMES
+from measure.verdict.verdict_record import QUANTITY_ENTRIES
 
 _MOST = 14
 _CHART = 620
@@ -41,7 +41,7 @@ def answer_of(outcome: ProposalOutcome, *, subject: str, effect: str) -> Propose
         sentence=spoken(outcome),
         tone=Tone.SETTLED if outcome.decision is Decision.KEPT else Tone.MISSED,
         quantities={one.name: replace(one.estimate, name=one.name) for one in outcome.strengths},
-        document={"effect": effect, **json_values(outcome, names=NAMES)},
+        document={"effect": effect, **json_values(outcome, names=QUANTITY_ENTRIES)},
         head=Head(
             figures=[] if retest is None else [_errors(retest)],
             facts=facts,

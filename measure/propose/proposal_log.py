@@ -12,7 +12,7 @@ from flagdata.core.json_values import json_values
 from flagdata.errors import CorruptError
 from flagdata.recipes.documents import read_json
 from measure.propose.outcome import ProposalOutcome
-from measure.verdict.verdict_record import NAMES
+from measure.verdict.verdict_record import QUANTITY_ENTRIES
 
 SCHEMA = "flagdata.proposals/1"
 _FORMER_SCHEMA = "flagdata.ledger/1"
@@ -56,7 +56,10 @@ def add(path: Path, outcome: ProposalOutcome, *, effect: str) -> None:
     Raises:
         CorruptError: the file is not a proposal log.
     """
-    all_entries = [*entries(path), {"effect": effect, **json_values(outcome, names=NAMES)}]
+    all_entries = [
+        *entries(path),
+        {"effect": effect, **json_values(outcome, names=QUANTITY_ENTRIES)},
+    ]
     text = json.dumps(
         {"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False
     )

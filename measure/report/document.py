@@ -24,7 +24,7 @@ import numpy as np
 from flagdata.answer.quantity import Bound, Quantity
 from flagdata.core.json_values import json_values
 from flagdata.errors import InputError
-from measure.verdict.verdict_record import NAMES, Verdict
+from measure.verdict.verdict_record import QUANTITY_ENTRIES, Verdict
 
 SCHEMA = "flagdata.verdict/1"
 _SCALARS = {bool: "true or false", int: "a whole number", str: "a text"}
@@ -80,7 +80,7 @@ def _current(candidate: Any) -> Any:
 
 def plain(value: Any) -> Any:
     """Returns a value as JSON has it, see `flagdata.core.json_values`, with open ends in words."""
-    return json_values(value, number=_written, names=NAMES)
+    return json_values(value, number=_written, names=QUANTITY_ENTRIES)
 
 
 def _written(number: float) -> float | str | None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         with_level,
     )
     from measure.verdict.verdict_record import (
-        NAMES,
+        QUANTITY_ENTRIES,
         Candidate,
         Comparison,
         Conclusion,

@@ -23,7 +23,7 @@ class Conclusion(StrEnum):
     OUTSIDE = "none of the library"
 
 
-NAMES = {Quantity: ("value=point", "low", "high", "unit", "level", "bound")}
+QUANTITY_ENTRIES = {Quantity: ("value=point", "low", "high", "unit", "level", "bound")}
 """What documents of verdicts state of a quantity, since their first version; see
 `flagdata.core.json_values`."""
 

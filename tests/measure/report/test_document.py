@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 
+from flagdata.answer import Quantity
 from flagdata.errors import InputError
 from measure.report import as_document, from_document
-from measure.verdict import Conclusion, Verdict
+from measure.verdict import Conclusion, Verdict, estimate_text
+from measure.verdict.quantity import NONE
 from tests.golden_answers import changes
 from tests.measure.report.verdicts import Size, verdict, with_holes
 
@@ -93,6 +95,25 @@ def test_missing_numbers_and_open_intervals_come_back() -> None:
     assert differences(from_document(document), whole) == []
 
 
+@pytest.mark.parametrize(
+    ("stated", "text"),
+    [
+        ({"value": 0.35, "low": 0.35, "high": "Infinity", "bound": "at-least"}, "at least 0.35"),
+        ({"value": 2.0, "low": 0.0, "high": 2.0, "bound": "at-most"}, "at most 2"),
+        ({"value": 1.0, "low": 0.0, "high": "Infinity", "bound": "nothing"}, "not determined"),
+        ({"value": None, "low": None, "high": None, "bound": None}, NONE),
+    ],
+)
+def test_a_quantity_of_a_stored_document_is_read_and_written_as_it_was(
+    stated: dict[str, Any], text: str
+) -> None:
+    document = written(verdict(Conclusion.EFFECT))
+    document["ranking"][0]["strength"] = stated | {"unit": "1", "level": 0.95}
+    again = from_document(document)
+    assert estimate_text(again.ranking[0].strength).startswith(text)
+    assert written(again) == document
+
+
 def test_a_document_that_does_not_state_whether_another_draw_could_decide_otherwise_is_read() -> (
     None
 ):
@@ -106,7 +127,9 @@ def test_the_document_holds_every_field_by_its_name() -> None:
     """Walked beside the dataclasses, so that a field added to the verdict cannot be left out."""
 
     def walk(value: Any, document: Any) -> None:
-        if dataclasses.is_dataclass(value):
+        if isinstance(value, Quantity):
+            assert list(document) == ["value", "low", "high", "unit", "level", "bound"]
+        elif dataclasses.is_dataclass(value):
             assert document.keys() == {f.name for f in dataclasses.fields(value)}
             for field in dataclasses.fields(value):
                 walk(getattr(value, field.name), document[field.name])

@@ -12,7 +12,7 @@ from flagdata.core.provenance import file_hash
 from flagdata.errors import ConflictError, CorruptError, RefusedError
 from flagdata.recipes.documents import read_json
 from measure.report.document import SCHEMA
-from measure.verdict import NAMES, Verdict
+from measure.verdict import QUANTITY_ENTRIES, Verdict
 from tests.studies.challenge.folder import ChallengeFolder, write_json
 
 
@@ -49,7 +49,7 @@ class Filing:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """A verdict as JSON, None for numbers that are not finite."""
-    return {"schema": SCHEMA, **json_values(verdict, names=NAMES)}
+    return {"schema": SCHEMA, **json_values(verdict, names=QUANTITY_ENTRIES)}
 
 
 def file(folder: ChallengeFolder, filing: Filing) -> None:
