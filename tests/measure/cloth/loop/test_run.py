@@ -246,9 +246,9 @@ def test_a_strength_of_two_signs_leans_on_either_end() -> None:
     high, low = at(*np.linspace(0.7, 0.999, 300)), at(*np.linspace(0.001, 0.2, 300))
     middle, either = at(*np.linspace(0.4, 0.6, 300)), at(*([0.01, 0.5, 0.99] * 100))
     assert (high.bound, high.high) == ("at-least", math.inf)
-    assert high.value == pytest.approx(null + (-0.3 + 1.1 * 0.715) / factor, rel=0.01)
+    assert high.point == pytest.approx(null + (-0.3 + 1.1 * 0.715) / factor, rel=0.01)
     assert (low.bound, low.low) == ("at-most", -math.inf)
-    assert low.value == pytest.approx(null + (-0.3 + 1.1 * 0.19) / factor, rel=0.01)
+    assert low.point == pytest.approx(null + (-0.3 + 1.1 * 0.19) / factor, rel=0.01)
     assert middle.bound is None
     assert either.bound == "nothing"
     assert with_level(either) == "not determined"
