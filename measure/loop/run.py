@@ -516,9 +516,7 @@ def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
         statistic=tested.statistic,
         null=[float(v) for v in conformal.null],
         kinds=conformal.count,
-        p_value=Quantity.of(
-            value=tested.p, low=low, high=high, unit="1", level=CRITERIA.interval
-        ),
+        p_value=Quantity.of(value=tested.p, low=low, high=high, unit="1", level=CRITERIA.interval),
         level=level,
         critical=conformal.critical(level),
         nulls=bank.words,

@@ -33,7 +33,14 @@ EFFECTS = (
 def changed(one: Quantity, **ends: float) -> Quantity:
     """The same with another value or another end."""
     given = {"value": one.point, "low": one.low, "high": one.high, **ends}
-    return Quantity.of(**given, unit=one.unit, level=one.level, bound=one.bound)
+    return Quantity.of(
+        given["value"],
+        given["low"],
+        given["high"],
+        unit=one.unit,
+        level=one.level,
+        bound=one.bound,
+    )
 
 
 def about(value: float, half: float, unit: str = "m") -> Quantity:
