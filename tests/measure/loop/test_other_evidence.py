@@ -96,8 +96,13 @@ def test_gusts_are_named_where_the_course_is_turbulences(
     blowing: tuple[NullModel, Reference],
 ) -> None:
     null, reference = blowing
-    gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
-    assert named(gusty) == ["gusts"]
+    # In twelve segments a draw in five leads by less than two standard errors.
+    gusty = [
+        named(judge(seen(null, {}, gusts=1.0, course=slow(0.2), seed=seed), reference, level=0.02))
+        for seed in range(10)
+    ]
+    assert gusty.count(["gusts"]) >= 8
+    assert gusty.count([]) == 10 - gusty.count(["gusts"])
     # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that
     # pass.
     passing = judge(
