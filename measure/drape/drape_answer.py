@@ -220,7 +220,7 @@ def answer_of_drapes(found: Draped) -> Calibrated:
                 "drapes": ", ".join(str(face.count) for face in found.faces),
                 "area weight": f"{found.area_weight.text} kg/m², as stated",
                 "disc and pedestal": f"{2e3 * DISC:.0f} mm over {2e3 * PEDESTAL:.0f} mm",
-                "stiffer thread": f"at {found.direction:.0f}° in the flat cloth",
+                "stiffer thread": f"at {found.direction:z.0f}° in the flat cloth",
             },
             limits=[one.sentence for one in found.findings],
         ),
