@@ -109,7 +109,7 @@ def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decisi
         reduction=some,
         floor=some,
         share=None,
-        helped=replace(some, low=low),
+        helped=Quantity.of(value=0.01, low=low, high=0.011, unit="m"),
         control=None if apart is None else some,
         apart=control,
         control_names=("drag",),
