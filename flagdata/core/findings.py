@@ -91,7 +91,7 @@ _KINDS = {
         constant-wind control-characters crop-cuts-motion cut-off damaged-references damping-assumed
         depth-by-content direction-mean-of-numbers doubtful-numbers draft-unconfirmed
         edges-stretched edit-list-passed-over encoding-assumed expiry-unfinished failed-simulations
-        few-effective-draws fewer-components files-missing flag-cut-off flag-size-contradicted
+        few-effective-draws files-missing flag-cut-off flag-size-contradicted
         flies-aside frames-lost frames-missing frames-not-shown frames-repeated frames-undecoded
         gaps gif-delays half-without-readings hdr-transfer hours-off index-damaged
         inertia-does-not-fit interlaced labels-clash leans-on-prior log-disordered markers-astray

@@ -54,7 +54,7 @@ OF_THE_LAST_VERSION = {
     "measure/closing/close_loop_call.py",
     "measure/cloth/film_options.py",
     "measure/commands/close_loop.py",
-    "measure/nulls/null_plan.py",  # a hash
+    "measure/nulls/null_simulation.py",  # a hash
     "measure/trajectories/experiment_recipe.py",
     "measure/trajectories/trajectory.py",  # a hash
 }

@@ -35,7 +35,8 @@ def test_of_a_misfit_that_is_flat_from_a_strength_on_the_strength_is_at_least_wh
     # 4 ln(1000/s) = 2.706, the quantile of chi-squared at 90 %: s = 508, less the factor of
     # e^(1.645/2).
     assert found.low == pytest.approx(1000 * math.exp(-2.706 / 4) * math.exp(-1.645 / 2), rel=0.01)
-    assert (found.value, found.high, found.bound, found.level) == (
+    assert found.value is None
+    assert (found.point, found.high, found.bound, found.level) == (
         found.low,
         math.inf,
         "at-least",
@@ -59,7 +60,7 @@ def test_a_misfit_that_is_flat_towards_none_bounds_from_above() -> None:
     assert (found.low, found.bound) == (0.0, "at-most")
     assert (
         found.high
-        == found.value
+        == found.point
         == pytest.approx(1000 * math.exp(2.706 / 4) * math.exp(1.645 / 2), rel=0.01)
     )
 
@@ -78,7 +79,7 @@ def test_a_bound_of_a_negative_strength_is_one_from_above_and_ends_where_the_eff
     assert (found.low, found.bound) == (pytest.approx(TURNED.described.admissible[0]), "at-most")
     assert (
         found.high
-        == found.value
+        == found.point
         == pytest.approx(-0.1 * math.exp(-2.706 / 4) * math.exp(-1.645 / 2), rel=0.01)
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.core.arrays import FloatArray, IntArray
-from flagdata.core.findings import Finding
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError
 from models.evaluation import SCORES, Resamples, estimate
 from models.evaluation.bootstrap import ScoreEstimate
@@ -133,7 +133,10 @@ def _admissible(
         else f"{training} clips train a fold"
     )
     text = f"{most} principal components are kept, not {components}: {reason}"
-    return most, (Finding.of("fewer-components", text, value=float(most)),)
+    fewer = Finding(
+        kind="fewer-components", severity=Severity.WARNING, what=text, value=float(most)
+    )
+    return most, (fewer,)
 
 
 def leave_one_group_out(
