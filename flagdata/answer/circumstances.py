@@ -41,14 +41,13 @@ class Circumstances:
 def list_circumstances(several: Sequence[Circumstances]) -> dict[str, str]:
     """Lists what there is to know of recordings: date and time, session, anemometer, clock."""
     facts: dict[str, str] = {}
-    starts = [one.start for one in several if one.start is not None]
-    if starts:
-        ends = [
-            one.start + round(one.seconds * NANOSECONDS) for one in several if one.start is not None
-        ]
-        zones = {one.zone for one in several if one.start is not None}
+    dated = [(one, one.start) for one in several if one.start is not None]
+    if dated:
+        first = min(start for _, start in dated)
+        last = max(start + round(one.seconds * NANOSECONDS) for one, start in dated)
+        zones = {one.zone for one, _ in dated}
         facts["date and time"] = _write_period(
-            min(starts), max(ends), zones.pop() if len(zones) == 1 else None
+            first, last, zones.pop() if len(zones) == 1 else None
         )
     for name, stated in (
         ("session", [one.session for one in several]),

@@ -197,7 +197,7 @@ def calibrate_flag(chosen: Calibrating, *, workers: int) -> CalibratedFlag:
         anemometer = _anemometer(chosen, size, reading, lake)
     if weighable is not None:
         weighing = _weigh(chosen, weighable, size, reading, lake, workers=workers)
-        answer = _answer_weight(chosen, weighing, anemometer, lake)
+        answer = _answer_weight(weighing, anemometer)
         return CalibratedFlag(answer=answer, weighing=weighing)
     from measure.anemometer.reading_answer import answer_of_reading
 
@@ -264,9 +264,7 @@ def _weigh(
     )
 
 
-def _answer_weight(
-    chosen: Calibrating, weighing: Weighing, anemometer: Made | None, lake: Lake | None
-) -> Calibrated:
+def _answer_weight(weighing: Weighing, anemometer: Made | None) -> Calibrated:
     from measure.cloth.calibration_answer import answer_of_calibration
 
     row = weighing.row

@@ -237,9 +237,13 @@ def _alike(confident: Sequence[Weighed], tested: BaseModelTest, level: float) ->
     """Selects those of the confidence set whose scores recordings do not separate from the
     largest, that first; none where that is no larger than nulls' at a level, and something else
     rejects the base model."""
-    ordered = sorted(confident, key=lambda w: -w.score)
-    if not ordered or tested.null.p(ordered[0].score) > level:
-        return []
+    close = _close_to_first(confident)
+    return [] if not close or tested.null.p(close[0].score) > level else close
+
+
+def _close_to_first(candidates: Sequence[Weighed]) -> list[Weighed]:
+    """Selects those whose scores are within `Criteria.alike_scores` of the largest, that first."""
+    ordered = sorted(candidates, key=lambda w: -w.score)
     return [w for w in ordered if w.score >= ordered[0].score - CRITERIA.alike_scores]
 
 
@@ -367,10 +371,8 @@ def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     by_gain = sorted(able, key=lambda w: -w.gains.sum())
     first = (*able[: CRITERIA.refitted], *by_gain[: CRITERIA.refitted])
-    confident = [w for w in judgement.ranking if w.column in judgement.confident]
-    most = max((w.score for w in confident), default=0.0)
-    alike = [w for w in confident if w.score >= most - CRITERIA.alike_scores]
-    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in (*first, *alike))])
+    close = _close_to_first([w for w in judgement.ranking if w.column in judgement.confident])
+    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in (*first, *close))])
     return tuple(column for column in chosen if column != GUST_COLUMN)
 
 

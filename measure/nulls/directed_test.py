@@ -38,6 +38,7 @@ from functools import cached_property
 import numpy as np
 
 from flagdata.core.arrays import BoolArray, FloatArray
+from models.trained.outliers import shrunk_covariance
 
 SHOWN = 0.25
 """a: the design shows an effect where a quarter of its expected strength is a standard error. Of
@@ -83,16 +84,6 @@ class Summary:
     unknown: FloatArray
     covariates: FloatArray
     damping: float = 0.0
-
-    def at(self, values: FloatArray) -> Summary:
-        """Returns the same experiment with other values (column,), such as what a model leaves."""
-        return Summary(
-            values=values,
-            directions=self.directions,
-            unknown=self.unknown,
-            covariates=self.covariates,
-            damping=self.damping,
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,7 +134,7 @@ class _Learnt:
         of_chance = (1 - _OWN_VARIANCE) * of_chance + _OWN_VARIANCE * diagonal
         of_chance += 1e-6 * np.diag(of_chance).mean() * np.eye(len(of_chance))
         factor = np.linalg.cholesky(of_chance)
-        shrunk = shrink(np.linalg.solve(factor, (residuals / width).T).T)
+        shrunk, _ = shrunk_covariance(np.linalg.solve(factor, (residuals / width).T).T)
         return cls(mean=mean, width=width, covariance=factor @ shrunk @ factor.T, sizes=sizes)
 
     def score(self, summary: Summary, free: Sequence[int]) -> _Scored:
@@ -306,20 +297,6 @@ def beside(
         for kind in range(len(first))
     ]
     return np.array(of_kinds), scaled(first, second, value)
-
-
-def shrink(rows: FloatArray) -> FloatArray:
-    """Estimates the covariance (column, column) of rows (row, column) about their mean, drawn
-    towards equal variances by the share that is best for its squared error (Ledoit and Wolf 2004).
-    """
-    about = rows - rows.mean(axis=0)
-    count, columns = about.shape
-    sample = about.T @ about / count
-    equal = float(np.trace(sample)) / columns
-    apart = float(((sample - equal * np.eye(columns)) ** 2).sum())
-    chance = float(((about**2).sum(axis=1) ** 2).sum() - count * (sample**2).sum()) / count**2
-    share = min(chance / apart, 1.0) if apart > 0 else 1.0
-    return np.asarray((1 - share) * sample + share * equal * np.eye(columns), dtype=np.float64)
 
 
 def _ridge(features: FloatArray, values: FloatArray, penalty: float) -> FloatArray:

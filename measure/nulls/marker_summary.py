@@ -27,10 +27,7 @@ def sought_on_markers(columns: tuple[str, ...]) -> tuple[Sought, ...]:
     turned from its log: where the log has a tolerance, that is not known anyway."""
     (turned,) = (one for one in library() if one.name == TURNED)
     low, high = (end - turned.described.null for end in turned.described.prior)
-    strengths = [
-        *on_markers(),
-        Strengths(column=turned, low=low, high=high),
-    ]
+    strengths = [*on_markers(), Strengths(column=turned, low=low, high=high)]
     return tuple(
         Sought(name=one.name, expected=one.expected, signs=one.signs)
         for one in strengths
@@ -38,40 +35,15 @@ def sought_on_markers(columns: tuple[str, ...]) -> tuple[Sought, ...]:
     )
 
 
-def summarise_markers(
-    statistics: Statistics,
-    speeds: FloatArray,
-    places: list[int],
-    *,
-    prior: FloatArray,
-    usual_speed: float,
-    damping: float,
-) -> Summary:
-    """Summarises an experiment.
-
-    Args:
-        speeds: (segment,) of the wind [m/s].
-        places: of the effects that are sought, among the columns.
-        prior: (theta,) standard deviations of the calibrated parameters.
-        usual_speed: about which the mean of nulls goes with the wind [m/s].
-        damping: logarithm of its ratio to the nominal one.
-    """
-    parts = [statistics] if statistics.turning is None else [statistics, statistics.turning]
-    response = np.concatenate([part.response.mean(axis=0) for part in parts])
-    faster = (speeds - usual_speed) / max(usual_speed, _STILL)
-    return Summary(
-        values=np.concatenate([part.r.mean(axis=0) for part in parts]),
-        directions=response[:, places],
-        unknown=np.concatenate([response[:, : len(THETA)] * prior, _logged(parts)], axis=1),
-        covariates=np.array([faster.mean(), (faster**2).mean()]),
-        damping=damping,
-    )
-
-
 def summarise_evidence(
     evidence: Evidence, places: list[int], *, usual_speed: float, damping: float
 ) -> Summary:
     """Summarises the experiment that evidence is of, by what a model leaves of it.
+
+    Args:
+        places: of the effects that are sought, among the columns.
+        usual_speed: about which the mean of nulls goes with the wind [m/s].
+        damping: logarithm of its ratio to the nominal one.
 
     Raises:
         UsageError: it is what is left across a column.
@@ -82,20 +54,27 @@ def summarise_evidence(
             where="directed test",
             fix="test that of all columns",
         )
-    return summarise_markers(
-        evidence.statistics,
-        evidence.speeds,
-        places,
-        prior=evidence.prior,
-        usual_speed=usual_speed,
+    parts = _parts(evidence.statistics)
+    response = np.concatenate([part.response.mean(axis=0) for part in parts])
+    faster = (evidence.speeds - usual_speed) / max(usual_speed, _STILL)
+    known = response[:, : len(THETA)] * evidence.prior
+    return Summary(
+        values=np.concatenate([part.r.mean(axis=0) for part in parts]),
+        directions=response[:, places],
+        unknown=np.concatenate([known, _logged(parts)], axis=1),
+        covariates=np.array([faster.mean(), (faster**2).mean()]),
         damping=damping,
     )
 
 
 def chance_of_markers(statistics: Statistics) -> FloatArray:
     """Computes how segments differ from the mean of their experiment, (segment, column)."""
-    parts = [statistics] if statistics.turning is None else [statistics, statistics.turning]
-    return np.concatenate([part.r - part.r.mean(axis=0) for part in parts], axis=1)
+    return np.concatenate([part.r - part.r.mean(axis=0) for part in _parts(statistics)], axis=1)
+
+
+def _parts(statistics: Statistics) -> list[Statistics]:
+    """Lists the errors' statistics and, where they are looked at, the moments'."""
+    return [statistics] if statistics.turning is None else [statistics, statistics.turning]
 
 
 def _logged(parts: list[Statistics]) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.core.arrays import FloatArray, IntArray
-from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, THETA
+from measure.forecasting.calibrated_parameters import PRIOR, THETA
 from measure.inference.random_effect import Nulls
 from measure.inference.segment_evidence import Evidence
 from measure.probes.lines import strongest
@@ -26,24 +26,18 @@ class NullGroups(StatisticRows):
 
     Attributes:
         shares: (group, column) of `shares_of_drops`.
-        swings: (group, part) of the wind's course, of no part where it is not looked at.
         settled: (group, quantity) what recordings settle at, of none where it is not looked at.
         lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
         deviations: (group, theta) of the calibrated parameters from the true ones, in standard
             errors.
-        noise: (group,) of the markers [m].
         kinds: (group,) of numerics.
-        damping: (group,) logarithm of its ratio to the nominal one.
     """
 
     shares: FloatArray
-    swings: FloatArray
     settled: FloatArray
     lines: FloatArray | None
     deviations: FloatArray
-    noise: FloatArray
     kinds: IntArray
-    damping: FloatArray
 
     @classmethod
     def of(cls, evidence: Evidence, segment: Nulls) -> NullGroups:
@@ -56,19 +50,12 @@ class NullGroups(StatisticRows):
             segment: one segment of it.
         """
         nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
-        swing, settles = (
-            np.zeros(0) if values is None else values
-            for values in (evidence.swing, evidence.settles)
-        )
         return cls(
             shares=shares_of_drops(evidence)[None],
-            swings=swing[None],
-            settled=settles[None],
+            settled=(np.zeros(0) if evidence.settles is None else evidence.settles)[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
             deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
-            noise=segment.noise,
             kinds=segment.numerics,
-            damping=segment.calibration[:, DAMPING],
         )
 
 

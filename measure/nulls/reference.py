@@ -156,8 +156,8 @@ class NullBank:
         places = [self.columns.index(one.name) for one in sought]
         usual_speed = float(similar.speeds.mean())
         groups: list[NullGroups] = []
-        first_groups: list[NullGroups] = []
         kinds: list[Summary] = []
+        swings: list[FloatArray] = []
         chance: list[FloatArray] = []
         for left_out in left_out_groups(similar, similar, segments, seed=seed):
             outside, model = left_out.outside, left_out.model.under(prior)
@@ -167,12 +167,12 @@ class NullBank:
                 NullGroups.of(evidence.select(chosen), outside.select(chosen[:1]))
                 for chosen in different.values()
             )
-            chosen = left_out.groups[0]
-            first_groups.append(NullGroups.of(evidence.select(chosen), outside.select(chosen[:1])))
+            first = evidence.select(left_out.groups[0])
+            swings.append(np.zeros(0) if first.swing is None else first.swing)
             chance.append(chance_of_markers(outside.statistics))
             kinds.append(
                 summarise_evidence(
-                    evidence.select(chosen),
+                    first,
                     places,
                     usual_speed=usual_speed,
                     damping=float(outside.calibration[0, DAMPING]),
@@ -180,7 +180,7 @@ class NullBank:
             )
         return Reference.of(
             NullGroups.joined(groups),
-            first=NullGroups.joined(first_groups),
+            swings=np.stack(swings),
             directed=DirectedTest.of(sought, kinds, chance),
             columns=self.columns,
             usual_speed=usual_speed,
@@ -254,7 +254,6 @@ class Reference:
         directed: the test along the effects, by one group of each kind.
         swings: (kind, part) of the wind's course in the same groups; of no part where it is not
             looked at.
-        dampings: (kind,) logarithm of their ratio to the nominal one.
         settled: (group, quantity) what recordings settle at.
         lines, standing_out: of the nulls, and how far each group stands out; None where spectra are
             not looked at.
@@ -271,7 +270,6 @@ class Reference:
     deviations: FloatArray
     directed: DirectedTest
     swings: FloatArray
-    dampings: FloatArray
     settled: FloatArray
     lines: Lines | None
     standing_out: FloatArray | None
@@ -285,7 +283,7 @@ class Reference:
         cls,
         groups: NullGroups,
         *,
-        first: NullGroups,
+        swings: FloatArray,
         directed: DirectedTest,
         columns: tuple[str, ...],
         usual_speed: float,
@@ -294,7 +292,7 @@ class Reference:
 
         Args:
             groups: of all kinds.
-            first: one of each kind.
+            swings: of one group of each kind.
         """
         scaled = np.empty_like(groups.shares)
         for kind in np.unique(groups.kinds):
@@ -307,8 +305,7 @@ class Reference:
             kinds=groups.kinds,
             deviations=groups.deviations,
             directed=directed,
-            swings=first.swings,
-            dampings=first.damping,
+            swings=swings,
             settled=groups.settled,
             lines=lines,
             standing_out=None
@@ -498,8 +495,9 @@ class Reference:
                 where="reference",
                 fix="look at them in the nulls as well",
             )
-        powers = np.array([power(np.abs(part), self.dampings) for part in self.swings.T])
-        own = self.swings * np.exp(-np.outer(self.dampings, powers))
+        dampings = np.array([kind.damping for kind in self.directed.kinds])
+        powers = np.array([power(np.abs(part), dampings) for part in self.swings.T])
+        own = self.swings * np.exp(-np.outer(dampings, powers))
         of_kinds = [
             _farthest_part(own[kind], np.delete(own, kind, axis=0)) for kind in range(len(own))
         ]

@@ -123,8 +123,7 @@ def from_artifact(
     description = (
         observation.known if observation.known.pins is not None else of_simulation(artifact, first)
     )
-    described = replace(observation, source=artifact.id, known=description)
-    return replace(described, session=artifact.session)
+    return replace(observation, source=artifact.id, known=description, session=artifact.session)
 
 
 def from_sequence(

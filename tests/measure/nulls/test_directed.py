@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from scipy.stats import norm
 
 from flagdata.core.arrays import FloatArray
 from measure.nulls import GroupedConformal
-from measure.nulls.directed_test import DirectedTest, Sought, Summary, beside, shrink
+from measure.nulls.directed_test import DirectedTest, Sought, Summary, beside
+from models.trained.outliers import shrunk_covariance
 
 COLUMNS, SEGMENTS = 20, 12
 HIDDEN = 1e-4
@@ -75,7 +77,7 @@ def covariance_by_sums(rows: FloatArray) -> FloatArray:
 
 def test_a_covariance_is_shrunk_as_ledoit_and_wolf_have_it() -> None:
     rows = np.random.default_rng(3).normal(size=(9, 5)) * [1.0, 2.0, 3.0, 1.0, 0.5]
-    np.testing.assert_allclose(shrink(rows), covariance_by_sums(rows), rtol=1e-12)
+    np.testing.assert_allclose(shrunk_covariance(rows)[0], covariance_by_sums(rows), rtol=1e-12)
 
 
 def test_scores_are_those_of_the_equation() -> None:
@@ -92,7 +94,8 @@ def test_scores_are_those_of_the_equation() -> None:
     # Within kinds all columns are alike and independent, so that V is shrunk as the columns are.
     within = [np.repeat(np.r_[np.eye(3), -np.eye(3)], 2, axis=0)] * 7
     sought = (Sought(name="one", expected=2.0, signs=(1,)),)
-    scores = DirectedTest.of(sought, kinds, within).scores(kinds[0].at(np.array([2.0, 1.0, 0.0])))
+    seen = replace(kinds[0], values=np.array([2.0, 1.0, 0.0]))
+    scores = DirectedTest.of(sought, kinds, within).scores(seen)
 
     def z(values: FloatArray, others: list[Summary]) -> tuple[float, float]:
         rows = np.stack([other.values for other in others])
